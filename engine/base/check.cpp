@@ -1,0 +1,25 @@
+#include "engine/base/check.hpp"
+
+#include <cstring>
+#include <utility>
+
+namespace colony {
+namespace {
+thread_local FailureContext* innermost = nullptr;
+}  // namespace
+
+FailureContext::FailureContext(std::string text) : text_(std::move(text)), outer_(innermost) { innermost = this; }
+FailureContext::~FailureContext() { innermost = outer_; }
+
+void fail_check(const char* condition, const char* file, int line) {
+  const char* tail = std::strstr(file, "engine/");
+  if (tail == nullptr) tail = std::strstr(file, "server/");
+  std::string contexts;
+  for (const FailureContext* context = innermost; context != nullptr; context = context->outer_) {
+    contexts = "; " + context->text_ + contexts;
+  }
+  throw CheckFailure("check failed: " + std::string(condition) + " at " + (tail != nullptr ? tail : file) + ":" +
+                     std::to_string(line) + contexts);
+}
+
+}  // namespace colony

@@ -1,0 +1,86 @@
+// body: a noisy ellipsoid on the dish, prepared for evaluation: the field f of one cell.
+// Method:  f(p) = 1 - u^2 - v^2 - w^2 + noise(u, v, w), (u, v, w) = p in the cell's frame over its semiaxes; f >= 0 and z >= 0 is cell.
+//          The sign of f is decided without the noise wherever |1 - u^2 - v^2 - w^2| exceeds the noise bound.
+// Units:   um. The field is dimensionless.
+// Errors:  CHECKs finite input and positive semiaxes.
+// Threads: pure.
+// Source:  the paper, section 3; Gardner's series as in HyperFun's solid noise.
+#pragma once
+
+#include <span>
+
+#include "engine/base/types.hpp"
+#include "engine/model/params.hpp"
+
+namespace colony {
+
+/// Axis-parallel box, um.
+struct Box {
+  Vec3 low = Vec3::Zero();
+  Vec3 high = Vec3::Zero();
+  bool empty() const { return !(low.x() < high.x() && low.y() < high.y() && low.z() < high.z()); }
+  double volume() const { return empty() ? 0.0 : (high.x() - low.x()) * (high.y() - low.y()) * (high.z() - low.z()); }
+};
+
+/// The part common to both (possibly empty).
+Box intersection(const Box& a, const Box& b);
+bool meets(const Box& a, const Box& b);
+
+/// Geometry of a body, as stored in a cell.
+struct BodyGeometry {
+  Vec3 centre_um = Vec3::Zero();
+  Vec3 semiaxes_um = Vec3::Zero();
+  Vec3 rotation_rad = Vec3::Zero();
+  Vec3 noise_offset = Vec3::Zero();
+};
+
+/// Rodrigues' rotation matrix of a rotation vector.
+Mat3 rotation_matrix(const Vec3& rotation_rad);
+/// The rotation vector of a rotation matrix; angle in [0, pi].
+Vec3 rotation_vector(const Mat3& rotation);
+
+class Body {
+ public:
+  Body() = default;
+  Body(const BodyGeometry& geometry, const NoiseParams& noise);
+
+  /// f at p (um), double precision: the reference, and what pictures and measurements use.
+  double field(const Vec3& point_um) const;
+  /// 1 - u^2 - v^2 - w^2 at p, without noise.
+  double smooth_field(const Vec3& point_um) const;
+  /// Bounding box of the noisy body above the dish: semiaxes times sqrt(1 + bound), rotated, clipped at z >= 0.
+  const Box& box() const { return box_; }
+  /// Half extent of the noise-free ellipsoid along a unit vector, um.
+  double half_width_um(const Vec3& unit) const;
+  /// True if (x, y) lies in the vertical projection of the noise-free ellipsoid.
+  bool footprint_contains(double x_um, double y_um) const;
+  /// Half extents of that projection along x and y, um.
+  Vec2 footprint_half_extent_um() const;
+  /// Largest height z of the noisy body's bounding box and so on are in box().
+
+  const Vec3& centre_um() const { return centre_; }
+  const Vec3& semiaxes_um() const { return semiaxes_; }
+  /// Rows: the cell's axes divided by the semiaxes, so (u, v, w) = to_unit() * (p - centre).
+  const Mat3& to_unit() const { return to_unit_; }
+  const Vec3& noise_offset() const { return noise_offset_; }
+  const NoiseParams& noise() const { return noise_; }
+  double noise_bound() const { return noise_bound_; }
+
+ private:
+  Vec3 centre_ = Vec3::Zero();
+  Vec3 semiaxes_ = Vec3::Ones();
+  Mat3 to_unit_ = Mat3::Identity();
+  Vec3 noise_offset_ = Vec3::Zero();
+  NoiseParams noise_;
+  double noise_bound_ = 0.0;
+  Box box_;
+  double footprint_xx_ = 1.0, footprint_xy_ = 0.0, footprint_yy_ = 1.0;  // inverse of the shadow's 2x2 form
+};
+
+/// Volume of the noise-free ellipsoid above the dish, um^3, analytic.
+double volume_above_dish_um3(const BodyGeometry& geometry);
+
+/// f~ at p: f minus what the neighbours take there. `rule` kSum: sum over max(0, f_j), the paper's; kMax: the largest only.
+double deformed_field(const Body& body, std::span<const Body* const> neighbours, ContactRule rule, const Vec3& point_um);
+
+}  // namespace colony

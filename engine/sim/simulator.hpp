@@ -1,0 +1,71 @@
+// simulator: decides what happens next, one event at a time, and applies it. The event history is the checkpoint:
+// replay() the stored events into a new simulator and step() goes on with the same bytes.
+// Method:  discrete events in the order (due time, kind, cell id); the window is how far the engine may look ahead.
+// Random:  every draw is addressed by (seed, cell, ordinal, purpose, lane); no generator state.
+// Threads: one thread at a time.
+// Errors:  CheckFailure on a bug; founders that cannot be placed are an error of place_founders, found before a job starts.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "engine/base/result.hpp"
+#include "engine/model/colony.hpp"
+#include "engine/model/event.hpp"
+#include "engine/model/params.hpp"
+#include "engine/sim/agenda.hpp"
+
+namespace colony {
+
+/// Bounds of a run, tested after every event in serial order.
+struct Until {
+  std::optional<std::uint64_t> cells;
+  std::optional<double> time_h;
+};
+
+/// Everything that decides a history.
+struct RunSpec {
+  Seed seed = 1;
+  Params params;
+  Until until;
+};
+
+/// The founding cells, ids 1..n, ready for `founded` events. Errors (kInvalid) point into the model object:
+/// "/founders/positions_um/3" for a founder that overlaps an earlier one beyond tolerance or lies outside the dish,
+/// "/founders" when 1,000 tries found no place. Pure: the same spec gives the same cells.
+Result<std::vector<Cell>> place_founders(const RunSpec& spec);
+
+class Simulator {
+ public:
+  /// The spec must be valid (validate() empty); founders are placed here and CHECKed.
+  explicit Simulator(RunSpec spec);
+
+  /// Folds one stored event; nothing is decided. Events must come in order, from seq 1.
+  void replay(const Event& stored);
+
+  /// Decides the next event, applies it and returns it, `finished` included; nullopt after `finished`.
+  std::optional<Event> step();
+
+  /// Ends the history from outside (cancel, limit, failure): the `finished` event at the current time, applied.
+  Event finish(FinishReason reason);
+
+  const Colony& colony() const { return colony_; }
+  const Agenda& agenda() const { return agenda_; }
+  const RunSpec& spec() const { return spec_; }
+
+ private:
+  Event decide_founded() const;
+  Event decide(const AgendaItem& item) const;
+  std::optional<FinishReason> reason_to_finish() const;
+  Event commit(Event event);
+
+  const RunSpec spec_;                       // fixed after construction
+  std::vector<Cell> founders_;               // fixed after construction
+  Colony colony_;
+  Agenda agenda_;
+  std::vector<AgendaItem> window_;           // due inside the current window, in serial order; next_ is the first unhandled
+  std::size_t next_ = 0;
+};
+
+}  // namespace colony

@@ -1,0 +1,61 @@
+// message: a request and a response as plain values, so that handlers need no socket and tests need no server.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace colony::server::http {
+
+/// Header names are compared without case; order is kept.
+class Headers {
+ public:
+  void set(std::string_view name, std::string_view value);             // replaces
+  void add(std::string_view name, std::string_view value);
+  std::optional<std::string_view> get(std::string_view name) const;    // the first
+  std::size_t count(std::string_view name) const;
+  const std::vector<std::pair<std::string, std::string>>& all() const { return items_; }
+
+ private:
+  std::vector<std::pair<std::string, std::string>> items_;
+};
+
+struct Request {
+  std::string method;                                          // "GET", ...
+  std::string path;                                            // percent-decoded, starts with '/', no query, base path removed
+  std::vector<std::pair<std::string, std::string>> query;      // percent-decoded, in order
+  Headers headers;
+  std::string body;                                            // complete, within the limit
+  std::string request_id;
+  std::vector<std::string> path_params;                        // filled by the router, e.g. the job id
+};
+
+/// A body that is made piece by piece. The session calls pull on a worker thread, never twice at once.
+class BodySource {
+ public:
+  enum class Pull { kMore, kWait, kEnd };
+  virtual ~BodySource() = default;
+  /// Appends the next piece (at most about 64 KiB) to `out`. kMore: call again once sent; kWait: nothing now, call again when
+  /// woken (or after keep_alive); kEnd: the body is complete (what was appended is still sent).
+  virtual Pull pull(std::string& out) = 0;
+  /// The session registers how it wants to be woken; `wake` may be called from any thread, also spuriously.
+  virtual void on_ready(std::function<void()> wake) { (void)wake; }
+  /// What to send after 15 s without a piece (an SSE comment); empty: nothing.
+  virtual std::string_view keep_alive() const { return {}; }
+  /// What to send when the server drains, before the end ("event: bye" of a stream); empty: nothing.
+  virtual std::string_view farewell() const { return {}; }
+};
+
+struct Response {
+  int status = 200;
+  Headers headers;                                             // Content-Type and the like; the session adds the rest
+  std::string body;
+  std::unique_ptr<BodySource> stream;                          // if set: sent chunked instead of body
+};
+
+}  // namespace colony::server::http

@@ -1,0 +1,32 @@
+// router: from method and path to a handler. 404 and 405 (with Allow) are problem documents made here.
+// Threads: add only before the server starts; dispatch from any thread.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/http/message.hpp"
+
+namespace colony::server::http {
+
+using Handler = std::function<Response(const Request&)>;
+
+/// application/problem+json (RFC 9457); http/ needs it for its own refusals and has no JSON library, so it escapes by itself.
+/// `code` e.g. "not-found" becomes type urn:colony:problem:<code>.
+Response problem(int status, std::string_view code, std::string_view title, std::string_view detail, std::string_view request_id);
+
+class Router {
+ public:
+  /// `pattern`: segments, "{}" captures one, e.g. "/v1/jobs/{}/events". HEAD is answered by the GET handler without its body.
+  void add(std::string method, std::string pattern, Handler handler);
+  /// Finds and runs the handler. An exception becomes 500 "internal" with the request id, without details.
+  Response dispatch(Request& request) const;
+
+ private:
+  struct Route { std::string method; std::vector<std::string> segments; Handler handler; };
+  std::vector<Route> routes_;
+};
+
+}  // namespace colony::server::http

@@ -1,0 +1,94 @@
+// service: jobs as the API sees them: submit, look, command, and read the past. Owns the runner threads and the live progress hub.
+// Promise: a command is durable before it returns; a seq is announced only after its commit; terminal states absorb.
+// Threads: every function from any thread. Errors: Result, never exceptions.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/analysis/series.hpp"
+#include "engine/base/result.hpp"
+#include "engine/model/colony.hpp"
+#include "engine/sim/simulator.hpp"
+#include "server/store/store.hpp"
+
+namespace colony::server {
+
+struct JobsConfig {
+  std::size_t concurrent_max = 1;          // colonies growing at a time
+  std::size_t queued_max = 1000;
+  std::uint64_t cells_max = 1'000'000;     // per job; beyond: failed, reason "limit"
+  std::uint64_t events_max = 50'000'000;   // per job; beyond: failed, reason "limit"
+  std::size_t cached_colonies_max = 16;    // folded colonies kept for pictures and tables
+};
+
+/// Where a job is now; for a live job fresher than its row (but never ahead of the last commit in `last_seq`).
+struct Progress {
+  std::uint64_t last_seq = 0;
+  double time_h = 0.0;
+  std::uint64_t cells = 0, active = 0, passive = 0, senescent = 0;
+  std::optional<double> fraction;          // of the nearer bound, 0..1
+  std::optional<double> cells_per_s;       // wall rate while running
+  std::optional<double> eta_s;
+};
+
+struct JobView {
+  JobRow job;
+  Progress progress;
+};
+
+/// A colony at a past or present moment, shared and immutable.
+struct ColonyAt {
+  std::shared_ptr<const Colony> colony;
+  std::shared_ptr<const RunSpec> spec;
+  double time_h = 0.0;                     // asked for, or of the last event
+  Digest digest;
+};
+
+/// Turns a stored spec into what the simulator runs (main.cpp wires the codec in, so that jobs/ needs no JSON).
+using SpecDecoder = std::function<Result<RunSpec>(const std::string& spec_json)>;
+
+class JobService {
+ public:
+  static std::unique_ptr<JobService> create(Store& store, JobsConfig config, SpecDecoder decode);
+  virtual ~JobService() = default;         // as drain()
+
+  /// Recovers jobs that were running when the process died, then starts the runners.
+  virtual Status start() = 0;
+  /// Stops taking jobs, stops runners between two events (jobs stay `running` in the store and go on at the next start), flushes.
+  virtual void drain() = 0;
+
+  struct Submitted { JobView view; bool created = true; };
+  virtual Result<Submitted> submit(const NewJob& job) = 0;
+  virtual Result<JobView> show(const std::string& id) = 0;
+  struct Page { std::vector<JobView> items; std::optional<std::string> next; };
+  virtual Result<Page> list(const JobFilter& filter, std::size_t limit, const std::string& cursor) = 0;
+  virtual Result<std::vector<std::uint64_t>> counts() = 0;
+
+  /// `changed` false: the job was already in the state this leads to. Another terminal state: kConflict ("job-terminal").
+  struct Commanded { JobView view; bool changed = true; };
+  virtual Result<Commanded> cancel(const std::string& id) = 0;
+  virtual Result<Commanded> pause(const std::string& id) = 0;
+  virtual Result<Commanded> resume(const std::string& id) = 0;
+  virtual Status remove(const std::string& id) = 0;
+
+  virtual Result<std::vector<Event>> events(const std::string& id, const EventFilter& filter, std::size_t limit) = 0;
+  virtual Result<std::vector<LogRow>> log(const std::string& id, std::int64_t after_index, std::size_t limit) = 0;
+  /// Events with time_h <= at_h (all stored ones if none). Beyond a live job's time: kNotReached, parameter "at_h".
+  virtual Result<ColonyAt> colony_at(const std::string& id, std::optional<double> at_h) = 0;
+  /// `points` rows in equal steps from 0 to the end (values after the last event <= t).
+  virtual Result<std::vector<SeriesRow>> series(const std::string& id, std::size_t points) = 0;
+
+  /// Calls `wake` (any thread, must not block, may be spurious) after every commit, progress change (at most 5 a second)
+  /// and state change of the job, until the subscription is destroyed.
+  class Subscription { public: virtual ~Subscription() = default; };
+  virtual std::unique_ptr<Subscription> subscribe(std::int64_t job_key, std::function<void()> wake) = 0;
+
+  virtual Store& store() = 0;
+};
+
+}  // namespace colony::server

@@ -1,0 +1,104 @@
+// store: the one SQLite database DATA/colony.db. One writer thread does every write and every checkpoint (group commit);
+// readers use read-only connections, never checkpoint and hold no transaction across a wait.
+// Promise: a call that returns success is on disk (synchronous=FULL). An event is visible to readers only when committed.
+// Errors:  kStorage for the disk, kNotFound, kConflict, kKeyReused, kLimit as named at each call; the data is then as before.
+// Threads: every function from any thread.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/analysis/series.hpp"
+#include "engine/base/result.hpp"
+#include "engine/model/event.hpp"
+#include "server/store/records.hpp"
+
+namespace colony::server {
+
+struct StoreConfig {
+  std::string data_dir;
+  std::size_t batch_rows_max = 1000;        // a write batch closes at this many rows,
+  std::int64_t batch_wait_ms = 50;          // this age, or at once when a request waits
+  std::size_t queued_events_max = 20'000;   // a full queue makes append_events wait
+};
+
+struct JobFilter {
+  std::optional<JobState> state;
+  std::optional<std::string> kind;
+  std::optional<std::string> name;
+  std::vector<std::pair<std::string, std::string>> labels;
+};
+
+struct JobPage {
+  std::vector<JobRow> items;               // newest first
+  std::optional<std::string> next;         // opaque cursor, authenticated by its own form: a made-up one is kInvalid "cursor"
+};
+
+struct EventFilter {
+  std::uint64_t after = 0;                 // seq > after
+  std::vector<EventKind> kinds;            // empty: all
+  std::optional<std::uint32_t> cell_id;    // the subject, or one of the cells of the event
+};
+
+/// What the runner knows with a batch of events.
+struct EventBatch {
+  std::int64_t job_key = 0;
+  std::vector<Event> events;               // dense, following last_seq
+  std::vector<SeriesRow> series;           // hourly rows
+  std::uint64_t cell_count = 0, active_count = 0, passive_count = 0, senescent_count = 0;   // after the last event
+};
+
+class Store {
+ public:
+  /// Opens or creates DATA (0700) and its database, takes the lock file, migrates the schema by user_version.
+  /// Errors: kConflict when another process holds the lock, kStorage otherwise.
+  static Result<std::unique_ptr<Store>> open(const StoreConfig& config);
+  virtual ~Store() = default;
+
+  // --- jobs; every write is durable when it returns ---
+  struct Submitted { JobRow job; bool created = true; };
+  /// A used key with the same body hash returns the same job (created = false); with another, kKeyReused.
+  /// More than `queued_max` queued jobs: kBusy.
+  virtual Result<Submitted> create_job(const NewJob& job, std::size_t queued_max) = 0;
+  virtual Result<JobRow> find_job(const std::string& id) = 0;
+  virtual Result<JobRow> find_job(std::int64_t job_key) = 0;
+  virtual Result<JobPage> list_jobs(const JobFilter& filter, std::size_t limit, const std::string& cursor) = 0;
+  /// Count of jobs by state, in the order of JobState.
+  virtual Result<std::vector<std::uint64_t>> count_jobs() = 0;
+  /// Oldest queued job -> running, in one transaction; nullopt if none is queued.
+  virtual Result<std::optional<JobRow>> take_queued_job() = 0;
+  /// Moves a job from one of `from` to `to`; kConflict (and no change) if its state is none of them. Adds a log line.
+  virtual Result<JobRow> set_state(std::int64_t job_key, const std::vector<JobState>& from, JobState to,
+                                   const std::string& reason, const std::string& detail) = 0;
+  /// The `finished` event, the terminal state and its reason in one transaction, after all events appended before.
+  virtual Result<JobRow> finish_job(const EventBatch& last, JobState state, const std::string& reason,
+                                    const std::string& detail) = 0;
+  /// Only terminal jobs (else kConflict); events, placements, series and log go with it.
+  virtual Status delete_job(std::int64_t job_key) = 0;
+  /// Every job in state running (after a crash).
+  virtual Result<std::vector<JobRow>> running_jobs() = 0;
+
+  // --- events ---
+  /// Queues a batch for the writer; waits while the queue is full. `committed` runs on the writer thread after the commit
+  /// (or with the error: then nothing of this batch was stored). Batches of a job commit in the order given.
+  virtual void append_events(EventBatch batch, std::function<void(const Status&)> committed) = 0;
+  /// Waits until everything queued before is committed.
+  virtual Status flush() = 0;
+  /// Up to `limit` events by ascending seq. Complete: placement and woken rows joined.
+  virtual Result<std::vector<Event>> read_events(std::int64_t job_key, const EventFilter& filter, std::size_t limit) = 0;
+  /// The hourly rows, ascending.
+  virtual Result<std::vector<SeriesRow>> read_series(std::int64_t job_key) = 0;
+
+  // --- log ---
+  virtual Status add_log(std::int64_t job_key, const std::string& level, const std::string& message) = 0;
+  virtual Result<std::vector<LogRow>> read_log(std::int64_t job_key, std::int64_t after_index, std::size_t limit) = 0;
+
+  /// ok if a write transaction would succeed now (for readyz): database writable and at least `free_bytes_min` free on the disk.
+  virtual Status check_writable(std::uint64_t free_bytes_min) = 0;
+};
+
+}  // namespace colony::server
