@@ -1,0 +1,116 @@
+// server: a real colonyd on a free loopback port, in a data folder of its own, ended by its pid.
+// Promise: a server that crashes, prints a sanitizer's report or does not end cleanly fails the test that started it.
+import assert from 'node:assert/strict';
+import { spawn } from 'node:child_process';
+import { existsSync, mkdtempSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { dirname, join, resolve } from 'node:path';
+import { fileURLToPath } from 'node:url';
+import { cleanup } from './cleanup.mjs';
+import { Contract } from './contract.mjs';
+import { send } from './http.mjs';
+import { within } from './wait.mjs';
+
+export const top = resolve(dirname(fileURLToPath(import.meta.url)), '../../..');
+export const full = process.env.COLONY_TEST_FULL === '1';
+const serverBinary = process.env.COLONYD ?? join(top, 'build/release/bin/colonyd');
+export const cliBinary = process.env.COLONY ?? join(top, 'build/release/bin/colony');
+
+/** SIGTERM to the end of the process, as promised to operators. */
+const drainMax_ms = 10_000;
+const startMax_ms = 60_000;
+
+// A test that dies must not leave servers behind.
+const alive = new Set();
+process.on('exit', () => { for (const child of alive) child.kill('SIGKILL'); });
+
+export function temporaryFolder(t) {
+  const folder = mkdtempSync(join(tmpdir(), 'colony-system-'));
+  cleanup(t, () => rmSync(folder, { recursive: true, force: true }));
+  return folder;
+}
+
+/** Nothing of the surroundings may configure the programs under test. */
+export function cleanEnvironment() {
+  return Object.fromEntries(Object.entries(process.env)
+    .filter(([name]) => !name.startsWith('COLONY_') && !/proxy$/i.test(name) && !name.startsWith('NODE_')));
+}
+
+export class Server {
+  constructor(data, args) {
+    assert.ok(existsSync(serverBinary), `${serverBinary} is not built`);
+    this.data = data;
+    this.out = '';
+    this.err = '';
+    this.expectedToDie = false;
+    this.child = spawn(serverBinary, ['--listen', '127.0.0.1:0', '--data', data, ...args],
+      { stdio: ['ignore', 'pipe', 'pipe'], env: { ...cleanEnvironment(), HOME: data } });
+    alive.add(this.child);
+    this.child.stderr.on('data', (bytes) => { this.err += bytes; });
+    this.exited = new Promise((done) => {
+      this.child.on('close', (code, signal) => {
+        alive.delete(this.child);
+        done({ code, signal });
+      });
+    });
+    this.listening = new Promise((done, fail) => {
+      this.child.on('error', fail);
+      this.child.stdout.on('data', (bytes) => {
+        this.out += bytes;
+        const match = /^listening on http:\/\/127\.0\.0\.1:(\d+)\n/m.exec(this.out);
+        if (match) done(Number(match[1]));
+      });
+      this.exited.then(({ code, signal }) => fail(new Error(`colonyd ended (${code ?? signal}) before it listened:\n${this.err}`)));
+    });
+    this.listening.catch(() => {});
+  }
+
+  get pid() { return this.child.pid; }
+  get url() { return `http://127.0.0.1:${this.port}`; }
+
+  async ready() {
+    this.port = await within(startMax_ms, this.listening, 'colonyd to listen');
+    const openapi = await send(this.port, 'GET', '/openapi.json');
+    assert.equal(openapi.status, 200);
+    this.contract = new Contract(openapi.json);
+    return this;
+  }
+
+  /** One request; the answer is held against the OpenAPI document the server itself gives. */
+  async request(method, path, options = {}) {
+    const response = await send(this.port, method, path, options);
+    this.contract.check(method, path, response, options);
+    return response;
+  }
+
+  get(path, headers) { return this.request('GET', path, { headers }); }
+  post(path, json, headers) { return this.request('POST', path, { json, headers }); }
+
+  async counts() { return (await this.get('/v1/jobs/counts')).json; }
+
+  /** Ends it as an operator would; it must go in time, with status 0 and nothing terrible on stderr. */
+  async stop() {
+    if (this.child.exitCode === null && this.child.signalCode === null) this.child.kill('SIGTERM');
+    const end = await within(drainMax_ms, this.exited, 'colonyd to end after SIGTERM').catch((error) => {
+      this.child.kill('SIGKILL');
+      throw error;
+    });
+    if (this.expectedToDie) return;
+    assert.deepEqual(end, { code: 0, signal: null }, `colonyd did not end cleanly:\n${this.err.slice(-4000)}`);
+    assert.doesNotMatch(this.err, /Sanitizer|runtime error:|terminate called|check failed/);
+  }
+
+  /** As a power failure would. */
+  async kill() {
+    this.expectedToDie = true;
+    this.child.kill('SIGKILL');
+    assert.deepEqual(await within(drainMax_ms, this.exited, 'a killed process to end'), { code: null, signal: 'SIGKILL' });
+  }
+}
+
+/** Starts a server for a test and stops it at the test's end. Without `data` it gets a folder that goes with it. */
+export async function startServer(t, { data, args = [] } = {}) {
+  const server = new Server(data ?? temporaryFolder(t), args);
+  cleanup(t, () => server.stop());
+  return server.ready();
+}
