@@ -63,12 +63,10 @@ void CanonicalBytes::add_optional(const std::optional<double>& value) {
 }
 
 Digest chain(const Digest& previous, const CanonicalBytes& event) {
-  XXH3_state_t state;  // on the stack: one digest an event, no allocation
-  CHECK(XXH3_128bits_reset(&state) == XXH_OK);
-  CHECK(XXH3_128bits_update(&state, previous.bytes.data(), previous.bytes.size()) == XXH_OK);
-  CHECK(XXH3_128bits_update(&state, event.bytes().data(), event.bytes().size()) == XXH_OK);
+  std::vector<std::uint8_t> link(previous.bytes.begin(), previous.bytes.end());
+  link.insert(link.end(), event.bytes().begin(), event.bytes().end());
   XXH128_canonical_t canonical;
-  XXH128_canonicalFromHash(&canonical, XXH3_128bits_digest(&state));
+  XXH128_canonicalFromHash(&canonical, XXH3_128bits(link.data(), link.size()));
   Digest digest;
   std::memcpy(digest.bytes.data(), canonical.digest, digest.bytes.size());
   return digest;
