@@ -84,6 +84,8 @@ double noise_period(const NoiseParams& params);
 
 /// Volume of the noise-free ellipsoid above the dish, um^3, analytic.
 double volume_above_dish_um3(const BodyGeometry& geometry);
+/// Its centroid, um, analytic: where the nucleus of a new cell stands.
+Vec3 centroid_above_dish_um(const BodyGeometry& geometry);
 
 /// f~ at p: f minus what the neighbours take there. `rule` kSum: sum over max(0, f_j), the paper's; kMax: the largest only.
 double deformed_field(const Body& body, std::span<const Body* const> neighbours, ContactRule rule, const Vec3& point_um);
