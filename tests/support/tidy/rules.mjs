@@ -13,9 +13,8 @@ const libm = 'sin|cos|tan|asin|acos|atan|atan2|sinh|cosh|tanh|asinh|acosh|atanh|
 
 /** Calls that change bits between CPUs, runs or library versions, or that read the world. */
 const banned = [
-  // Ours live in namespace colony::det or have names of their own; a name after any other qualifier is not the library's.
-  [new RegExp(`(?<![\\w:.>])(?:std\\s*::\\s*|::\\s*)?(?:${libm})[fl]?\\s*\\(`, 'g'),
-    'changes bits between CPUs: use the deterministic functions of engine/base'],
+  [new RegExp(`(?<![\\w:.>])(?:std\\s*::\\s*|::\\s*)(?:${libm})[fl]?\\s*\\(`, 'g'),
+    'changes bits between CPUs: use the deterministic functions of engine/base/maths'],
   [/(?<![\w:.>])(?:std\s*::\s*|::\s*)?s?rand\s*\(|\brandom_device\b|\bmt19937|\bdefault_random_engine\b|\b\w+_distribution\b|\brandom_shuffle\b|\bstd\s*::\s*shuffle\b/g,
     'randomness comes from engine/random only, addressed by purpose'],
   [/#\s*include\s*<(random|chrono|ctime|time\.h|execution|filesystem|fstream|iostream)>/g, 'this header has no use in the engine'],
@@ -26,6 +25,9 @@ const banned = [
   [/\bAngleAxis|\.\s*array\s*\(\s*\)\s*\.\s*(sin|cos|tan|exp|log|pow)\b/g, "Eigen's transcendental functions change bits between CPUs"],
   [/#\s*pragma\s+GCC\s+(optimize|target)|__attribute__\s*\(\(\s*(target|optimize)|\b_mm\w*_f(n?m(add|sub))/g, 'no target or contraction tricks here'],
 ];
+
+/** Ours are colony::maths::sin and the like; a bare name would be the C library's, except where ours are defined. */
+const bareLibm = new RegExp(`(?<![\\w:.>])(?:${libm})[fl]?\\s*\\(`, 'g');
 
 const unordered = /\b(?:std\s*::\s*)?unordered_(?:multi)?(?:map|set)\s*</g;
 const temporaryLambda = /(?:^|[^\w)\]\[])\[(?!\[)[^\][]*\]\s*(?:[({]|mutable\b|->|noexcept\b|<)/;
@@ -89,15 +91,16 @@ export const rules = [
     name: 'banned-calls', text: 'the engine calls nothing that changes between CPUs, runs or threads', files: engine,
     check(path, source) {
       const code = codeOnly(source);
-      return banned.flatMap(([regex, message]) => findAll(code, regex, (match) => `${match[0].trim()} ${message}`));
+      const all = /^engine\/base\/maths\.(hpp|cpp)$/.test(path) ? banned : [...banned, [bareLibm, 'would be the C library: say maths::']];
+      return all.flatMap(([regex, message]) => findAll(code, regex, (match) => `${match[0].trim()} ${message}`));
     },
     bad: [...['x = std::sin(y);', 'x = sin(y);', 'x = std::pow(y, 2);', 'x = ::exp(y);', 'x = atan2(a, b);', 'x = std::hypot(a, b);',
       'x = cosf(y);', 'x = std::log ( y );', 'x = std::fma(a, b, c);', 'int i = std::rand();', 'std::random_device d;',
       'std::normal_distribution<double> n;', 'std::shuffle(a, b, g);', '#include <random>', 'auto t = std::chrono::seconds(1);',
       'getenv("X");', 'std::this_thread::get_id();', 'std::reduce(a, b);', 'Eigen::AngleAxisd r;', 'x = v.array().exp();',
       '#pragma GCC optimize("fast-math")', 'y = _mm256_fmadd_ps(a, b, c);', 'const long now = time(nullptr);',
-    ].map((line) => ['engine/model/a.cpp', `${line}\n`])],
-    good: [['engine/model/a.cpp', '// std::sin(x) is banned\nx = std::sqrt(y) + std::abs(z) + std::floor(w) + det::sin(x) + table.log(2) + time_h();\n'
+    ].map((line) => ['engine/model/a.cpp', `${line}\n`]), ['engine/base/maths.cpp', 'double exp(double x) { return std::exp(x); }\n']],
+    good: [['engine/base/maths.cpp', 'double exp(double x) { return x; }\n'], ['engine/model/a.cpp', '// std::sin(x) is banned\nx = std::sqrt(y) + std::abs(z) + std::floor(w) + maths::sin(x) + table.log(2) + time_h();\n'
       + 'FailureContext context{"std::rand()"};\nconst int n = 1\'000; double distance_exp(int); using std::max;\n']],
   },
   {
@@ -128,12 +131,14 @@ export const rules = [
       const bare = targets.flatMap(({ line, message: target }) => {
         const links = [...code.matchAll(/\btarget_link_libraries\s*\(\s*([\w${}]+)([^)]*)\)/g)].filter((link) => link[1] === target)
           .map((link) => link[2]).join(' ');
-        return ['colony_flags', 'colony_warnings'].filter((name) => !new RegExp(`\\b${name}\\b`).test(links))
-          .map((name) => ({ line, message: `${target} does not link ${name}` }));
+        // The flags are public in every library of ours, so one of those brings them.
+        return [['colony_flags', /\bcolony_(?!warnings\b)\w+/], ['colony_warnings', /\bcolony_warnings\b/]]
+          .filter(([, regex]) => !regex.test(links)).map(([name]) => ({ line, message: `${target} does not link ${name}` }));
       });
       return [...globs, ...bare];
     },
     bad: [['engine/CMakeLists.txt', 'add_library(a STATIC a.cpp)\ntarget_link_libraries(a PUBLIC colony_flags)\n'],
+      ['engine/CMakeLists.txt', 'add_library(a STATIC a.cpp)\ntarget_link_libraries(a PRIVATE colony_warnings)\n'],
       ['engine/CMakeLists.txt', 'file(GLOB_RECURSE all *.cpp)\n'], ['client/cli/CMakeLists.txt', 'add_executable(b main.cpp)\n']],
     good: [['engine/CMakeLists.txt', 'add_library(f INTERFACE)\nadd_library(a STATIC a.cpp)\ntarget_link_libraries(a PUBLIC colony_flags\n  PRIVATE colony_warnings)\n']],
   },
