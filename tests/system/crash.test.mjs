@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { join } from 'node:path';
 import test from 'node:test';
-import { finishedJob, reached, show, submit, terminal } from './harness/jobs.mjs';
+import { command, finishedJob, reached, show, submit, terminal } from './harness/jobs.mjs';
 import { Server, full, startServer, temporaryFolder } from './harness/server.mjs';
 import { Stream } from './harness/stream.mjs';
 import { seeded, within } from './harness/wait.mjs';
@@ -86,7 +86,7 @@ test('kill -9', async (t) => {
     const server = await startServer(t, { data });
     const again = await server.post('/v1/jobs', spec, key);
     assert.deepEqual([again.status, again.json.id], [200, id]);
-    assert.equal((await server.post(`/v1/jobs/${id}/cancel`, {})).status, 202);
+    assert.equal((await command(server, id, 'cancel')).status, 202);
     await server.kill();
     const next = await startServer(t, { data });
     await reached(next, id, 'cancelled');

@@ -1,7 +1,7 @@
 // stream: server-sent events of a live job: no gap, no repetition, an end, and nobody waits for a slow reader.
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import { allEvents, endless, finishedJob, grown, reached, show, small, submit } from './harness/jobs.mjs';
+import { allEvents, command, endless, finishedJob, grown, reached, show, small, submit } from './harness/jobs.mjs';
 import { startServer } from './harness/server.mjs';
 import { openStream } from './harness/stream.mjs';
 
@@ -99,7 +99,7 @@ test('the event stream', async (t) => {
     const { id } = await submit(server, endless(25));
     const stream = await openStream(t, server, `/v1/jobs/${id}/events`);
     await stream.until('a first event', () => stream.history().length > 0);
-    assert.equal((await server.post(`/v1/jobs/${id}/cancel`, {})).status, 202);
+    assert.equal((await command(server, id, 'cancel')).status, 202);
     await stream.untilClosed();
     assert.equal(JSON.parse(stream.events.at(-1).data).state, 'cancelled');
     assert.deepEqual(ids(stream), dense(1, (await show(server, id)).last_seq));

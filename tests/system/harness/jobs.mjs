@@ -19,6 +19,11 @@ export async function submit(server, spec, headers) {
   return response.json;
 }
 
+/** cancel, pause or resume: a POST without a body, but with the content type that every POST must have. */
+export function command(server, id, name) {
+  return server.post(`/v1/jobs/${id}/${name}`, undefined, { 'Content-Type': 'application/json' });
+}
+
 export async function show(server, id) {
   const response = await server.get(`/v1/jobs/${id}`);
   assert.equal(response.status, 200, response.text);
