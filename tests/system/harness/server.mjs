@@ -43,7 +43,8 @@ export class Server {
     this.out = '';
     this.err = '';
     this.expectedToDie = false;
-    this.child = spawn(serverBinary, ['--listen', '127.0.0.1:0', '--data', data, ...args],
+    const listen = args.includes('--listen') ? [] : ['--listen', '127.0.0.1:0'];
+    this.child = spawn(serverBinary, [...listen, '--data', data, ...args],
       { stdio: ['ignore', 'pipe', 'pipe'], env: { ...cleanEnvironment(), HOME: data } });
     alive.add(this.child);
     this.child.stderr.on('data', (bytes) => { this.err += bytes; });
