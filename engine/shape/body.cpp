@@ -91,9 +91,9 @@ Body::Body(const BodyGeometry& geometry, const NoiseParams& noise)
   // Covariance-like form S = R diag(s^2) R^T: half extents are the roots of its diagonal, its upper 2x2 block is the shadow's.
   Mat3 form = Mat3::Zero();
   for (int i = 0; i < 3; ++i) form += (semiaxes_[i] * semiaxes_[i]) * (axes.col(i) * axes.col(i).transpose());
-  const double scale = std::sqrt(1.0 + noise_bound_);
+  noisy_scale_ = std::sqrt(1.0 + noise_bound_);
   for (int i = 0; i < 3; ++i) {
-    const double half = scale * std::sqrt(form(i, i));
+    const double half = noisy_scale_ * std::sqrt(form(i, i));
     box_.low[i] = centre_[i] - half;
     box_.high[i] = centre_[i] + half;
   }
@@ -129,6 +129,16 @@ double Body::half_width_um(const Vec3& unit) const {
     sum += along * along;
   }
   return std::sqrt(sum);
+}
+
+bool separated(const Body& a, const Body& b) {
+  const Vec3 apart = b.centre_um() - a.centre_um();
+  const double distance = std::sqrt(apart.squaredNorm());
+  if (!(distance > 0.0)) return false;
+  const Vec3 unit = apart / distance;
+  // Both lie inside their scaled ellipsoids, whose half widths along the line of centres must add up to reach. The margin is
+  // for rounding alone.
+  return distance > 1.000001 * (a.noisy_scale() * a.half_width_um(unit) + b.noisy_scale() * b.half_width_um(unit));
 }
 
 bool Body::footprint_contains(double x_um, double y_um) const {
