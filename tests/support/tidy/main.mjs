@@ -9,7 +9,8 @@ import { archiveFindings, archiveSelfTest } from './archive.mjs';
 
 const help = `usage: tests/tidy [--self-test] [--headers] [--archive FILE.a] [--only REGEX] [--results FILE]
   --self-test     first feed every rule its bad snippets; one that is not caught is a failure
-  --headers       also compile every header alone (g++ -fsyntax-only, two at a time)
+  --headers       also see that every header compiles alone; those that the build has not shown are compiled, with
+                  --headers=all every one
   --archive FILE  also disassemble the engine's archive and look for instructions and symbols that change bits
   --only REGEX    only the rules whose names match
   --results FILE  write "PASSED FAILED" there
@@ -51,6 +52,7 @@ export async function main(args) {
   for (let i = 0; i < args.length; ++i) {
     if (args[i] === '--self-test') options.selfTest = true;
     else if (args[i] === '--headers') options.headers = true;
+    else if (args[i] === '--headers=all') options.headers = options.allHeaders = true;
     else if (valued[args[i]] && args[i + 1]) options[valued[args[i]]] = args[++i];
     else {
       console.error(help);
@@ -86,7 +88,7 @@ export async function main(args) {
 
   if (options.headers && only.test('headers')) {
     const headers = paths.filter((path) => path.endsWith('.hpp'));
-    report('headers', await headersCompileAlone(top, headers), `${headers.length} headers compile alone`);
+    report('headers', await headersCompileAlone(top, headers, { all: options.allHeaders }), `${headers.length} headers compile alone`);
   }
   if (options.archive && only.test('archive')) {
     report('archive', archiveFindings(resolve(options.archive)), 'no fused or approximate instruction and no libm symbol but sqrt in the engine');
