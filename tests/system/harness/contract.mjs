@@ -79,6 +79,8 @@ export class Contract {
   /** `gate`: the request is made to be refused before its path is looked at. */
   check(method, path, response, { gate = false } = {}) {
     const what = `${method} ${path} -> ${response.status} ${mediaType(response.headers)}`;
+    // The document may state it, but a bug is a bug.
+    assert.notEqual(response.status, 500, `${what}: ${response.text}`);
     if (response.status >= 400 && method !== 'HEAD') this.checkProblem(response, what);
     if (gate && gateStatuses.includes(response.status)) return;
     const template = this.find(path);
