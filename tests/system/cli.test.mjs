@@ -170,6 +170,16 @@ test('the command line', async (t) => {
     assert.deepEqual(parsed(await ok('events', job.id, '--json')), events);
     assert.deepEqual(parsed(await ok('cells', job.id, '--json')), (await server.get(`/v1/jobs/${job.id}/cells`)).json.items);
     assert.deepEqual(parsed(await ok('series', job.id, '--json')), (await server.get(`/v1/jobs/${job.id}/series`)).json.items);
+    assert.deepEqual(parsed(await ok('events', job.id, '--ndjson')), events);
+    assert.deepEqual(parsed(await ok('events', job.id, '--ndjson', '--kind', 'divided')), events.filter(({ kind }) => kind === 'divided'));
+    for (const what of ['events', 'cells', 'series']) {
+      const csv = (await server.get(`/v1/jobs/${job.id}/${what}`, { Accept: 'text/csv' })).text;
+      assert.equal((await ok(what, job.id, '--csv')).out.toString(), csv, what);
+      assert.notEqual((await ok(what, job.id)).out.length, 0, `${what} as a table`);
+    }
+    const { id } = await submit(server, small(10, 40));
+    const followed = await ok('events', id, '--follow', '--ndjson');
+    assert.deepEqual(parsed(followed), await allEvents(server, id), 'followed live to the end');
   });
 
   await t.test('image writes a file that appears whole or not at all', async () => {
