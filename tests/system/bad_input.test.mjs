@@ -85,7 +85,7 @@ const id = '01890000-0000-7000-8000-000000000000';
 /** [what, method, path, headers, body, statuses, parameters]. */
 const requests = (known) => [
   ['an unknown job', 'GET', `/v1/jobs/${id}`, {}, undefined, [404]],
-  ['an id that is none', 'GET', '/v1/jobs/..%2f..%2fetc', {}, undefined, [404]],
+  ['an id that is none', 'GET', '/v1/jobs/..%2f..%2fetc', {}, undefined, [400, 404]],
   ['an unknown path', 'GET', '/v1/made-up', {}, undefined, [404]],
   ...['events', 'cells', 'series', 'image', 'log'].map((what) => [`${what} of an unknown job`, 'GET', `/v1/jobs/${id}/${what}`, {}, undefined, [404]]),
   ...['cancel', 'pause', 'resume'].map((what) => [`${what} of an unknown job`, 'POST', `/v1/jobs/${id}/${what}`, { 'Content-Type': 'application/json' }, '', [404]]),
