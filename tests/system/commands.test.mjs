@@ -3,7 +3,6 @@ import assert from 'node:assert/strict';
 import test from 'node:test';
 import { allEvents, command, endless, finishedJob, grown, reached, show, small, submit } from './harness/jobs.mjs';
 import { startServer } from './harness/server.mjs';
-import { eventually } from './harness/wait.mjs';
 
 test('commands', async (t) => {
   const server = await startServer(t, { args: ['--jobs.concurrent-max', '1'] });
@@ -90,18 +89,19 @@ test('commands', async (t) => {
     await reached(next, waits, 'succeeded');
   });
 
-  await t.test('Prefer: wait answers when the state changes', async () => {
+  await t.test('Prefer: wait answers when the revision changes, not before', async () => {
     const next = await startServer(t);
-    const { id } = await submit(next, small(3, 12));
-    const first = await next.get(`/v1/jobs/${id}`);
-    if (first.json.state !== 'succeeded') {
-      await eventually('the job to succeed through waiting answers', async () => {
-        const seen = await next.get(`/v1/jobs/${id}`);
-        const answer = await next.get(`/v1/jobs/${id}`, { Prefer: 'wait=20', 'If-None-Match': seen.headers.etag });
-        assert.ok([200, 304].includes(answer.status));
-        return (answer.json ?? seen.json).state === 'succeeded';
-      });
-    }
-    assert.equal((await show(next, id)).state, 'succeeded');
+    const { id } = await submit(next, endless(14));
+    await grown(next, id, 3);
+    assert.equal((await command(next, id, 'pause')).status, 202);
+    await reached(next, id, 'paused');
+    const seen = await next.get(`/v1/jobs/${id}`);
+    assert.ok(seen.headers.etag, 'a job has an ETag');
+    const waiting = next.get(`/v1/jobs/${id}`, { Prefer: 'wait=60', 'If-None-Match': seen.headers.etag });
+    assert.equal((await command(next, id, 'cancel')).status, 202);
+    const answer = await waiting;
+    assert.deepEqual([answer.status, answer.json?.state], [200, 'cancelled'], 'an answer before the change would say paused');
+    const over = await next.get(`/v1/jobs/${id}`, { Prefer: 'wait=1', 'If-None-Match': answer.headers.etag });
+    assert.equal(over.status, 304, 'nothing changed in the time given');
   });
 });

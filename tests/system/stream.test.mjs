@@ -22,6 +22,7 @@ test('the event stream', async (t) => {
     assert.equal(end.event, 'end');
     const said = JSON.parse(end.data);
     assert.deepEqual([said.state, said.reason, said.last_seq], ['succeeded', 'cells', job.last_seq]);
+    assert.equal(end.id, String(job.last_seq));
     assert.deepEqual(ids(stream), dense(1, job.last_seq));
     const events = await allEvents(server, id);
     assert.deepEqual(stream.history().map(({ data }) => JSON.parse(data)), events, 'the same facts as the stored ones');
@@ -71,18 +72,23 @@ test('the event stream', async (t) => {
       const progress = JSON.parse(data);
       return (progress.progress ?? progress).cells;
     });
+    assert.equal(cells.at(-1), 60);
     assert.ok(cells.every((count, index) => Number.isInteger(count) && (index === 0 || count >= cells[index - 1])), String(cells));
+    // What a browser does by itself after the connection closed: it must be told that there is nothing more.
+    const again = await server.get(`/v1/jobs/${id}/events?kind=progress`, { Accept: 'text/event-stream', 'Last-Event-ID': stream.events.at(-1).id });
+    assert.equal(again.status, 204);
   });
 
   await t.test('a reader that does not read holds up neither the job nor other readers', async () => {
-    // A wide colony gives far more bytes than the sockets between the two can hold.
-    const spec = { name: 'wide', preset: 'clonogenic', seed: 5, until: { time_h: 14 }, model: { founders: { count: 400, radius_um: 2500 } } };
+    // Twenty thousand founders are some 15 MB of events: more than the buffers of a connection hold.
+    const spec = { name: 'wide', preset: 'paper', seed: 5, until: { time_h: 0.1 }, model: { founders: { count: 20_000, radius_um: 20_000 } } };
     const { id } = await submit(server, spec);
     const path = `/v1/jobs/${id}/events`;
     const lazy = await openStream(t, server, path, { paused: true });
     const brisk = await openStream(t, server, path);
     const job = await reached(server, id, 'succeeded');
     await brisk.untilClosed();
+    assert.ok(brisk.events.reduce((sum, { data }) => sum + data.length, 0) > 12e6);
     assert.deepEqual(ids(brisk), dense(1, job.last_seq));
     // Now it reads: what it got is a true beginning, and reconnecting gives the rest, however often it was cut.
     lazy.read();

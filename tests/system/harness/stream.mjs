@@ -84,8 +84,8 @@ export class Stream {
 
   untilClosed() { return this.until('the stream to close', (stream) => stream.closed); }
 
-  /** The events of the history: those with an id. */
-  history() { return this.events.filter((event) => event.id !== undefined); }
+  /** The events of the history. `end` repeats the last id, so that a browser's own reconnect after it is answered with 204. */
+  history() { return this.events.filter(({ event, id }) => id !== undefined && event !== 'end'); }
   lastId() { return Number(this.history().at(-1)?.id ?? 0); }
   find(name) { return this.events.find(({ event }) => event === name); }
   close() { this.request.destroy(); }
