@@ -11,8 +11,8 @@ packages=(
   libboost1.81-dev          # server/http: Asio, Beast (the default 1.74 is too old)
   nlohmann-json3-dev        # server/api, client
   libeigen3-dev librandom123-dev libxxhash-dev libhwy-dev libspng-dev   # engine
-  libsqlite3-dev libsqlitecpp-dev sqlite3                    # server/store; the shell reads the database in the tests
-  libspdlog-dev libtomlplusplus-dev libssl-dev               # server
+  libsqlite3-dev sqlite3                                     # server/store; the shell reads the database in the tests
+  libspdlog-dev libtomlplusplus-dev                          # server
   libcli11-dev libcurl4-openssl-dev                          # client
   libgtest-dev libgmock-dev librapidcheck-dev                # tests
 )
