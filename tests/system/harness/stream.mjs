@@ -8,6 +8,7 @@ export class Stream {
   constructor(port, path, { headers = {}, paused = false } = {}) {
     this.events = [];      // {event, id, data}
     this.comments = 0;
+    this.lastEventId = '';  // what a browser would send when it reconnects
     this.retry_ms = undefined;
     this.closed = false;
     this.pending = { event: 'message', data: [] };
@@ -48,6 +49,8 @@ export class Stream {
 
   take(line) {
     if (line === '') {
+      // As in the standard: a message without data is not shown, but its id counts.
+      if (this.pending.id !== undefined) this.lastEventId = this.pending.id;
       if (this.pending.data.length > 0) this.events.push({ ...this.pending, data: this.pending.data.join('\n') });
       this.pending = { event: 'message', data: [] };
       return;
@@ -84,8 +87,8 @@ export class Stream {
 
   untilClosed() { return this.until('the stream to close', (stream) => stream.closed); }
 
-  /** The events of the history. `end` repeats the last id, so that a browser's own reconnect after it is answered with 204. */
-  history() { return this.events.filter(({ event, id }) => id !== undefined && event !== 'end'); }
+  /** The events of the history: those with an id. */
+  history() { return this.events.filter(({ id }) => id !== undefined); }
   lastId() { return Number(this.history().at(-1)?.id ?? 0); }
   find(name) { return this.events.find(({ event }) => event === name); }
   close() { this.request.destroy(); }
