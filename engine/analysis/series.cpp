@@ -6,13 +6,13 @@
 #include <vector>
 
 #include "engine/base/check.hpp"
+#include "engine/base/maths.hpp"
 
 namespace colony {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kUm2PerMm2 = 1e6;
-constexpr double kCoordinateMax_um = 1e9;    // so that a grid index fits 32 bits
+constexpr double kCoordinateMax_um = 2e9;    // a grid index fits 32 bits; cells lie within 1e9 um (grid.cpp)
 
 /// Grid cells first..last of one row, whose centres (first + 0.5, row + 0.5) ... lie in one footprint.
 struct RowSpan {
@@ -87,7 +87,7 @@ SeriesRow measure_series(const Colony& colony, double time_h) {
   row.volume_sd_um3 = std::sqrt(squares / count);
 
   row.area_um2 = static_cast<double>(union_area_um2(colony));
-  row.radius_um = std::sqrt(row.area_um2 / kPi);
+  row.radius_um = std::sqrt(row.area_um2 / maths::kPi);
   // Bodies too small to hold the centre of any grid cell have no area here, and then no density.
   if (row.area_um2 > 0.0) row.density_per_mm2 = count / row.area_um2 * kUm2PerMm2;
   return row;

@@ -7,7 +7,7 @@ namespace colony {
 namespace {
 
 // Towards the light: x to the right, y up, z to the viewer; (-1, 1, 1.6) over its length.
-const Vec3 kLight = Vec3(-1.0, 1.0, 1.6) / std::sqrt(4.56);
+constexpr double kLightX = -0.46829, kLightY = 0.46829, kLightZ = 0.74927;
 constexpr double kAmbient = 0.28;
 constexpr double kDiffuse = 0.92;
 
@@ -33,7 +33,7 @@ double rise(const TopView& view, std::int64_t row, std::int64_t column, std::int
 double brightness(const TopView& view, std::int64_t row, std::int64_t column) {
   const double slope_x = rise(view, row, column, 0, 1);
   const double slope_y = -rise(view, row, column, 1, 0);   // rows run down, y up
-  const double along = kLight.z() - slope_x * kLight.x() - slope_y * kLight.y();
+  const double along = kLightZ - slope_x * kLightX - slope_y * kLightY;
   const double diffuse = std::max(0.0, along / std::sqrt(1.0 + slope_x * slope_x + slope_y * slope_y));
   return kAmbient + kDiffuse * diffuse;
 }

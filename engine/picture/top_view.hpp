@@ -2,10 +2,8 @@
 // Method:  the visible height of a column (x, y) is the largest z >= 0 where some deformed cell f~_i >= 0. There every other
 //          f_j <= 0 (a positive f_j would reach higher), so f~_i = f_i: the visible surface is that of the union of the bodies,
 //          whatever the contact rule, and the owner is the body that reaches highest in the column. So each body is scanned
-//          alone, from above, and a height buffer keeps the highest. Where two neighbours reach equally high is their border,
+//          alone, from above (column.hpp), and a height buffer keeps the highest. Where two neighbours reach equally high is their border,
 //          the upper rim of the face f_i = f_j.
-//          The scan steps down by |f| / L, L a bound of |df/dz| over the column, and by kScanStepMin_um at least: it steps over
-//          nothing but a lobe thinner than that. Only the band where the noise can decide the sign is scanned.
 // Units:   um, pixels; y up, row 0 at the top; a pixel is its centre.
 // Errors:  none at run time; CHECKs the rows.
 // Threads: pure. Equal heights go to the lower id, so the order of work cannot matter.
@@ -18,9 +16,6 @@
 #include "engine/model/colony.hpp"
 
 namespace colony {
-
-/// Thinnest lobe that the scan cannot miss, um along z.
-inline constexpr double kScanStepMin_um = 0.02;
 
 /// Where the pixels lie in the plane.
 struct Frame {
@@ -56,11 +51,5 @@ struct TopView {
 /// The rows `rows` of the view; the same pixels whatever the rows asked for around them.
 TopView top_view(const Colony& colony, const Frame& frame, RowRange rows);
 inline TopView top_view(const Colony& colony, const Frame& frame) { return top_view(colony, frame, {0, frame.height_px}); }
-
-/// The highest z > floor_um with f >= 0 in the column (x, y) of `body`, or floor_um if there is none.
-double column_top_um(const Body& body, double x_um, double y_um, double floor_um);
-
-/// |df/dz| of the noise alone, at most, where (u, v, w) changes by `step` per um of z.
-double noise_slope_max(const NoiseParams& noise, const Vec3& step);
 
 }  // namespace colony
