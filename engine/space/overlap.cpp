@@ -28,37 +28,49 @@ struct Placement {
   }
 };
 
+// Buffers grow and never shrink: shrinking and growing again would clear them each time.
+template <class T>
+void reserve_size(std::vector<T>& buffer, std::size_t n) {
+  if (buffer.size() < n) buffer.resize(n);
+}
+
 void place(const Placement& placement, const PointSet& points, OverlapScratch& s) {
   const std::size_t n = points.size();
-  s.x.resize(n);
-  s.y.resize(n);
-  s.z.resize(n);
+  reserve_size(s.x, n);
+  reserve_size(s.y, n);
+  reserve_size(s.z, n);
   for (std::size_t i = 0; i < n; ++i) s.x[i] = placement.low[0] + points.x[i] * placement.extent[0];
   for (std::size_t i = 0; i < n; ++i) s.y[i] = placement.low[1] + points.y[i] * placement.extent[1];
   for (std::size_t i = 0; i < n; ++i) s.z[i] = placement.low[2] + points.z[i] * placement.extent[2];
 }
 
-// is_inside[i] for n points: the sign of f, the noise only inside the band. Returns how many are inside.
+// How many of n points are inside; is_inside[i] says which, unless none can be (then it is not written and 0 is returned).
+// The sign of f is decided without the noise outside the band; the band's points are gathered for the noise.
 std::uint32_t classify(const FloatBody& body, const float* x, const float* y, const float* z, std::size_t n, OverlapScratch& s) {
-  s.smooth.resize(n);
-  s.is_inside.resize(n);
-  s.band_index.resize(n);
+  reserve_size(s.smooth, n);
+  reserve_size(s.is_inside, n);
+  reserve_size(s.band_index, n + 1);
+  const float* const smooth = s.smooth.data();
+  const float band = body.band;
   kernel::smooth_field(body, x, y, z, n, s.smooth.data());
+  std::int32_t near_count = 0;
+  for (std::size_t i = 0; i < n; ++i) near_count += smooth[i] >= -band ? 1 : 0;
+  if (near_count == 0) return 0;
+
   std::size_t band_count = 0;
   std::uint32_t count = 0;
   for (std::size_t i = 0; i < n; ++i) {
-    const float f = s.smooth[i];
-    const bool inside = f > body.band;
+    const float f = smooth[i];
+    const bool inside = f > band;
     s.is_inside[i] = inside ? 1 : 0;
     count += inside ? 1U : 0U;
-    s.band_index[band_count] = static_cast<std::uint32_t>(i);  // kept only if the next line counts it
-    band_count += (f <= body.band && f >= -body.band) ? 1U : 0U;
+    s.band_index[band_count] = static_cast<std::uint32_t>(i);  // overwritten unless the next line counts it
+    band_count += (f <= band && f >= -band) ? 1U : 0U;
   }
-  if (band_count == 0) return count;
-  s.band_u.resize(n);
-  s.band_v.resize(n);
-  s.band_w.resize(n);
-  s.band_smooth.resize(n);
+  reserve_size(s.band_u, band_count);
+  reserve_size(s.band_v, band_count);
+  reserve_size(s.band_w, band_count);
+  reserve_size(s.band_noise, band_count);
   for (std::size_t k = 0; k < band_count; ++k) {
     const std::size_t i = s.band_index[k];
     const kernel::Unit p = kernel::to_unit(body, x[i], y[i], z[i]);
@@ -66,10 +78,10 @@ std::uint32_t classify(const FloatBody& body, const float* x, const float* y, co
     s.band_v[k] = p.v;
     s.band_w[k] = p.w;
   }
-  kernel::noise(body, s.band_u.data(), s.band_v.data(), s.band_w.data(), band_count, s.band_smooth.data());
+  kernel::noise(body, s.band_u.data(), s.band_v.data(), s.band_w.data(), band_count, s.band_noise.data());
   for (std::size_t k = 0; k < band_count; ++k) {
     const std::size_t i = s.band_index[k];
-    const bool inside = s.smooth[i] + s.band_smooth[k] >= 0.0F;
+    const bool inside = smooth[i] + s.band_noise[k] >= 0.0F;
     s.is_inside[i] = inside ? 1 : 0;
     count += inside ? 1U : 0U;
   }
@@ -111,9 +123,10 @@ void count_overlaps(const Body& body, std::span<const Body* const> neighbours, s
   const Placement placement(body.box());
   place(placement, points, s);
   out.hit_count = classify(FloatBody(body, placement.origin), s.x.data(), s.y.data(), s.z.data(), n, s);
-  s.inside_x.resize(n + 1);
-  s.inside_y.resize(n + 1);
-  s.inside_z.resize(n + 1);
+  if (out.hit_count == 0) return;
+  reserve_size(s.inside_x, n + 1);
+  reserve_size(s.inside_y, n + 1);
+  reserve_size(s.inside_z, n + 1);
   std::size_t inside = 0;
   for (std::size_t i = 0; i < n; ++i) {  // branch-free compaction: the slot is overwritten unless the point is inside
     s.inside_x[inside] = s.x[i];
@@ -127,7 +140,7 @@ void count_overlaps(const Body& body, std::span<const Body* const> neighbours, s
     }
   }
   for (std::size_t j = 0; j < neighbours.size(); ++j) {
-    if (!meets(neighbours[j]->box(), body.box())) continue;
+    if (!meets(neighbours[j]->box(), body.box()) || separated(*neighbours[j], body)) continue;
     const FloatBody other(*neighbours[j], placement.origin);
     out.shared_counts[j] = classify(other, s.inside_x.data(), s.inside_y.data(), s.inside_z.data(), inside, s);
   }

@@ -32,7 +32,7 @@ struct OverlapCounts {
 struct OverlapScratch {
   std::vector<float> x, y, z, smooth;          // points under test
   std::vector<float> inside_x, inside_y, inside_z;
-  std::vector<float> band_u, band_v, band_w, band_smooth;
+  std::vector<float> band_u, band_v, band_w, band_noise;
   std::vector<std::uint32_t> band_index;
   std::vector<std::uint8_t> is_inside;
 };

@@ -47,7 +47,9 @@ FloatBody::FloatBody(const Body& body, const Vec3& origin_um) {
   band = static_cast<float>(body.noise_bound()) * 1.0001F + 1e-5F;
 }
 
-void noise(const FloatBody& b, const float* u, const float* v, const float* w, std::size_t n, float* out) {
+void noise(const FloatBody& body, const float* __restrict u, const float* __restrict v, const float* __restrict w,
+           std::size_t n, float* __restrict out) {
+  const FloatBody b = body;  // a copy cannot alias out: the loop vectorises
   for (std::size_t i = 0; i < n; ++i) {
     const float sx = sine(b.frequency * u[i] + b.q1[0]);
     const float sy = sine(b.frequency * v[i] + b.q1[1]);
@@ -59,7 +61,9 @@ void noise(const FloatBody& b, const float* u, const float* v, const float* w, s
   }
 }
 
-void smooth_field(const FloatBody& b, const float* x, const float* y, const float* z, std::size_t n, float* out) {
+void smooth_field(const FloatBody& body, const float* __restrict x, const float* __restrict y, const float* __restrict z,
+                  std::size_t n, float* __restrict out) {
+  const FloatBody b = body;
   for (std::size_t i = 0; i < n; ++i) {
     const Unit p = to_unit(b, x[i], y[i], z[i]);
     out[i] = 1.0F - p.u * p.u - p.v * p.v - p.w * p.w;
