@@ -12,7 +12,7 @@ namespace colony {
 namespace {
 
 constexpr double kUm2PerMm2 = 1e6;
-constexpr double kCoordinateMax_um = 2e9;    // a grid index fits 32 bits; cells lie within 1e9 um (grid.cpp)
+constexpr double kCoordinateMax_um = 2e9;  // a grid index fits 32 bits; cells lie within 1e9 um (grid.cpp)
 
 /// Grid cells first..last of one row, whose centres (first + 0.5, row + 0.5) ... lie in one footprint.
 struct RowSpan {
@@ -33,11 +33,15 @@ void add_spans(const Body& body, std::vector<RowSpan>& spans) {
   const Vec2 half_um = body.footprint_half_extent_um();
   const Vec3& centre_um = body.centre_um();
   // One more on every side: the extent and the containment test round differently.
-  const std::int32_t left = grid_index(centre_um.x() - half_um.x()) - 1, right = grid_index(centre_um.x() + half_um.x()) + 1;
-  const std::int32_t bottom = grid_index(centre_um.y() - half_um.y()) - 1, top = grid_index(centre_um.y() + half_um.y()) + 1;
+  const std::int32_t left = grid_index(centre_um.x() - half_um.x()) - 1,
+                     right = grid_index(centre_um.x() + half_um.x()) + 1;
+  const std::int32_t bottom = grid_index(centre_um.y() - half_um.y()) - 1,
+                     top = grid_index(centre_um.y() + half_um.y()) + 1;
   for (std::int32_t row = bottom; row <= top; ++row) {
     const double y_um = static_cast<double>(row) + 0.5;
-    const auto inside = [&](std::int32_t column) { return body.footprint_contains(static_cast<double>(column) + 0.5, y_um); };
+    const auto inside = [&](std::int32_t column) {
+      return body.footprint_contains(static_cast<double>(column) + 0.5, y_um);
+    };
     std::int32_t first = left, last = right;
     while (first <= last && !inside(first)) ++first;
     while (last > first && !inside(last)) --last;

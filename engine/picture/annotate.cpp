@@ -9,22 +9,25 @@
 namespace colony {
 namespace {
 
-constexpr double kBarShareMax = 0.2;             // of the picture's width
+constexpr double kBarShareMax = 0.2;  // of the picture's width
 constexpr std::int64_t kWidthPerTextScale_px = 512;
 
 /// Pixels a dot of the font, and the unit of every distance here.
-std::int64_t unit_px(const Picture& picture) { return std::max<std::int64_t>(1, picture.width_px / kWidthPerTextScale_px); }
+std::int64_t unit_px(const Picture& picture) {
+  return std::max<std::int64_t>(1, picture.width_px / kWidthPerTextScale_px);
+}
 
 void draw_haloed_text(Picture& picture, std::int64_t row, std::int64_t column, std::string_view text, Ink ink) {
   const std::int64_t unit = unit_px(picture);
   for (std::int64_t dy = -1; dy <= 1; ++dy) {
-    for (std::int64_t dx = -1; dx <= 1; ++dx) draw_text(picture, row + dy * unit, column + dx * unit, text, unit, ink.halo);
+    for (std::int64_t dx = -1; dx <= 1; ++dx)
+      draw_text(picture, row + dy * unit, column + dx * unit, text, unit, ink.halo);
   }
   draw_text(picture, row, column, text, unit, ink.text);
 }
 
-void draw_haloed_rectangle(Picture& picture, std::int64_t row, std::int64_t column, std::int64_t height, std::int64_t width,
-                           Rgb colour, Rgb halo) {
+void draw_haloed_rectangle(Picture& picture, std::int64_t row, std::int64_t column, std::int64_t height,
+                           std::int64_t width, Rgb colour, Rgb halo) {
   const std::int64_t unit = unit_px(picture);
   fill_rectangle(picture, row - unit, column - unit, height + 2 * unit, width + 2 * unit, halo);
   fill_rectangle(picture, row, column, height, width, colour);
@@ -40,19 +43,21 @@ RoundLength round_length(int mantissa, int exponent) {
   double power = 1.0;
   for (int i = 0; i < (exponent < 0 ? -exponent : exponent); ++i) power *= 10.0;
   if (exponent >= 3) {
-    return {mantissa * power, std::to_string(mantissa) + std::string(static_cast<std::size_t>(exponent - 3), '0') + " mm"};
+    return {mantissa * power,
+            std::to_string(mantissa) + std::string(static_cast<std::size_t>(exponent - 3), '0') + " mm"};
   }
   if (exponent >= 0) {
     return {mantissa * power, std::to_string(mantissa) + std::string(static_cast<std::size_t>(exponent), '0') + " µm"};
   }
-  return {mantissa / power, "0." + std::string(static_cast<std::size_t>(-exponent - 1), '0') + std::to_string(mantissa) + " µm"};
+  return {mantissa / power,
+          "0." + std::string(static_cast<std::size_t>(-exponent - 1), '0') + std::to_string(mantissa) + " µm"};
 }
 
 }  // namespace
 
 ScaleBar scale_bar_of(const Picture& picture) {
   constexpr std::array<int, 3> kMantissas = {1, 2, 5};
-  constexpr int kExponentMin = -4, kExponentMax = 9;    // wider than any picture can be
+  constexpr int kExponentMin = -4, kExponentMax = 9;  // wider than any picture can be
   const double length_max_um = kBarShareMax * static_cast<double>(picture.width_px) * picture.um_per_px;
   RoundLength best = round_length(1, kExponentMin);
   for (int exponent = kExponentMin; exponent <= kExponentMax; ++exponent) {

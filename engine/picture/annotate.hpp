@@ -1,6 +1,6 @@
 // annotate: the scale bar (lower left) and the legend of the colours (upper left), drawn over a finished picture.
-// Method:  the bar is the longest of 1, 2, 5 x 10^k um that is at most a fifth of the width; its length is rounded to a pixel.
-//          Text and bar are drawn over a halo of the opposite lightness, so that they can be read over cells too.
+// Method:  the bar is the longest of 1, 2, 5 x 10^k um that is at most a fifth of the width; its length is rounded to
+//          a pixel. Text and bar are drawn over a halo of the opposite lightness, to be legible over cells too.
 // Units:   um, pixels.
 // Threads: pure.
 #pragma once
@@ -13,9 +13,9 @@ namespace colony {
 
 struct ScaleBar {
   double length_um = 0.0;
-  std::int64_t length_px = 0;    // at least 1
-  std::string label;             // "50 µm", "2 mm"
-  std::int64_t row = 0;          // upper left pixel of the bar
+  std::int64_t length_px = 0;  // at least 1
+  std::string label;           // "50 µm", "2 mm"
+  std::int64_t row = 0;        // upper left pixel of the bar
   std::int64_t column = 0;
   std::int64_t thickness_px = 0;
 };

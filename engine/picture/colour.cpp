@@ -10,15 +10,20 @@ namespace {
 
 // Lightness rises about evenly from point to point; the first is still clearly lighter than the background.
 constexpr std::array<Rgb, 6> kMap = {
-    Rgb{0x54, 0x2a, 0x7e}, Rgb{0x4a, 0x56, 0x9e}, Rgb{0x30, 0x80, 0xa0}, Rgb{0x3a, 0xa8, 0x8a}, Rgb{0x96, 0xcc, 0x56}, Rgb{0xf8, 0xe6, 0x4c},
+    Rgb{0x54, 0x2a, 0x7e}, Rgb{0x4a, 0x56, 0x9e}, Rgb{0x30, 0x80, 0xa0},
+    Rgb{0x3a, 0xa8, 0x8a}, Rgb{0x96, 0xcc, 0x56}, Rgb{0xf8, 0xe6, 0x4c},
 };
 
 double value_of(const Cell& cell, ColourBy colour_by, double time_h) {
   switch (colour_by) {
-    case ColourBy::kGeneration: return static_cast<double>(cell.generation);
-    case ColourBy::kAge: return time_h - cell.born_h;
-    case ColourBy::kVolume: return cell.volume_um3;
-    case ColourBy::kActivity: break;
+    case ColourBy::kGeneration:
+      return static_cast<double>(cell.generation);
+    case ColourBy::kAge:
+      return time_h - cell.born_h;
+    case ColourBy::kVolume:
+      return cell.volume_um3;
+    case ColourBy::kActivity:
+      break;
   }
   CHECK(false);
   return 0.0;
@@ -33,10 +38,14 @@ std::string with_tenth(double value) {
 ColourScale scale_of(ColourBy colour_by, double low, double high) {
   const auto whole = [](double value) { return std::to_string(floor_to_int(value + 0.5)); };
   switch (colour_by) {
-    case ColourBy::kGeneration: return {"generation", whole(low), whole(high)};
-    case ColourBy::kAge: return {"age", with_tenth(low) + " h", with_tenth(high) + " h"};
-    case ColourBy::kVolume: return {"volume", whole(low) + " µm³", whole(high) + " µm³"};
-    case ColourBy::kActivity: break;
+    case ColourBy::kGeneration:
+      return {"generation", whole(low), whole(high)};
+    case ColourBy::kAge:
+      return {"age", with_tenth(low) + " h", with_tenth(high) + " h"};
+    case ColourBy::kVolume:
+      return {"volume", whole(low) + " µm³", whole(high) + " µm³"};
+    case ColourBy::kActivity:
+      break;
   }
   return {};
 }
@@ -45,9 +54,12 @@ ColourScale scale_of(ColourBy colour_by, double low, double high) {
 
 Rgb activity_colour(Activity activity) {
   switch (activity) {
-    case Activity::kActive: return kActiveColour;
-    case Activity::kPassive: return kPassiveColour;
-    case Activity::kSenescent: return kSenescentColour;
+    case Activity::kActive:
+      return kActiveColour;
+    case Activity::kPassive:
+      return kPassiveColour;
+    case Activity::kSenescent:
+      return kSenescentColour;
   }
   CHECK(false);
   return {};

@@ -1,6 +1,6 @@
 // colour: the colour of every cell, and the scale that explains it.
-// Method:  activity has three fixed colours; the other quantities run over a map of rising lightness, from the least to the
-//          greatest value in the colony (generation and age from 0).
+// Method:  activity has three fixed colours; the other quantities run over a map of rising lightness, from the least
+//          to the greatest value in the colony (generation and age from 0).
 // Units:   generations, h, um3.
 // Threads: pure.
 #pragma once
@@ -24,13 +24,13 @@ Rgb map_colour(double share);
 
 /// What a legend needs to say. No title: there is nothing to explain (the colours are those of activities).
 struct ColourScale {
-  std::string title;       // "generation", "age", "volume"
-  std::string low_text;    // the value at share 0, with its unit
+  std::string title;     // "generation", "age", "volume"
+  std::string low_text;  // the value at share 0, with its unit
   std::string high_text;
 };
 
 struct CellColours {
-  std::vector<Rgb> of_cell;    // by id.value - 1
+  std::vector<Rgb> of_cell;  // by id.value - 1
   ColourScale scale;
 };
 

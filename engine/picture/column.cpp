@@ -13,10 +13,10 @@ constexpr double kAmplitudeRatio = 1.17;
 constexpr double kFrequencyRatio = 1.35;
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kToNearest = 6755399441055744.0;   // 1.5 x 2^52: adding it rounds to an integer, held in the low bits
+constexpr double kToNearest = 6755399441055744.0;  // 1.5 x 2^52: adding it rounds to an integer, held in the low bits
 
-/// sin x for |x| < 1e4, within 1e-9: reduced by multiples of pi, Taylor series to x^13 on |r| <= pi/2 (the next term is 7e-10).
-/// No branch and no call, so that the sines of one field run side by side.
+/// sin x for |x| < 1e4, within 1e-9: reduced by multiples of pi, Taylor series to x^13 on |r| <= pi/2 (the next term is
+/// 7e-10). No branch and no call, so that the sines of one field run side by side.
 inline double sine(double x) {
   const double shifted = x * (1.0 / kPi) + kToNearest;
   const double r = x - (shifted - kToNearest) * kPi;
@@ -34,7 +34,8 @@ inline double sine(double x) {
 /// max |s| over an interval around a point where it is `middle`, if it changes by `change` at most.
 double sine_bound(double middle, double change) { return std::min(1.0, std::abs(middle) + change); }
 
-/// The root between `in` (f >= 0) and `out` (f < 0): two steps of false position, on a bracket of little more than the step.
+/// The root between `in` (f >= 0) and `out` (f < 0): two steps of false position, on a bracket of little more than the
+/// step.
 double refined_um(const Column& column, double in_um, double in, double out_um, double out) {
   const double guess_um = in_um + (out_um - in_um) * (in / (in - out));
   const double value = column.field(guess_um);
@@ -73,7 +74,7 @@ NoiseLimits ColumnScan::noise_limits(const Column& column, double low_um, double
   const NoiseParams& noise = body_.noise();
   const double half_um = 0.5 * (high_um - low_um);
   const Vec3 at = column.noise_at(low_um + half_um);
-  const Vec3 change = noise.frequency * half_um * rate_;   // of q u, q v, q w
+  const Vec3 change = noise.frequency * half_um * rate_;  // of q u, q v, q w
   const double second = noise.amplitude / kAmplitudeRatio;
   const double sine_u = sine(noise.frequency * at.x());
   const double sine_v = sine(noise.frequency * at.y());
@@ -94,10 +95,13 @@ double ColumnScan::top_um(double x_um, double y_um, double floor_um) const {
   if (!(peak + body_.noise_bound() >= 0.0)) return floor_um;
   const double middle_um = -slope / step_squared_;
   const auto reach_um = [&](double level) { return std::sqrt((peak - level) / step_squared_); };
-  // Above `start` f is below 0 for certain; below `end` there is nothing to look for: inside for certain, or below the body.
+  // Above `start` f is below 0 for certain; below `end` there is nothing to look for: inside for certain, or below the
+  // body.
   double start_um = middle_um + reach_um(-body_.noise_bound());
   if (!(start_um > floor_um)) return floor_um;
-  const auto end_for = [&](double bound) { return peak > bound ? middle_um + reach_um(bound) : middle_um - reach_um(-bound); };
+  const auto end_for = [&](double bound) {
+    return peak > bound ? middle_um + reach_um(bound) : middle_um - reach_um(-bound);
+  };
   const double low_um = std::max(end_for(body_.noise_bound()), floor_um);
   const NoiseLimits limits = noise_limits(column, low_um, start_um);
   const double bound = std::min(limits.bound, body_.noise_bound());
@@ -110,7 +114,7 @@ double ColumnScan::top_um(double x_um, double y_um, double floor_um) const {
 
   double z_um = start_um;
   double field = column.field(z_um);
-  if (field >= 0.0) return z_um;   // tangent, within rounding
+  if (field >= 0.0) return z_um;  // tangent, within rounding
   while (z_um > end_um) {
     const double next_um = std::max(z_um - std::max(-field / slope_max, kScanStepMin_um), end_um);
     const double next = column.field(next_um);

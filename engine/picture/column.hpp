@@ -1,10 +1,11 @@
 // column: the top of one body above one point of the dish.
-// Method:  scan from above, stepping down by |f| / L, L a bound of |df/dz|, and by kScanStepMin_um at least: nothing is stepped
-//          over but a lobe thinner than that. Only the band is scanned where the noise can decide the sign. Both the band and L
-//          come from bounds of the noise on this very column: cells lie flat, so along z the in-plane factors of Gardner's
-//          product hardly change, and their values in the middle bound them far better than their amplitude does.
-//          f is evaluated along the column with a sine of its own: within kColumnFieldError of Body::field, the reference,
-//          and three times as fast. A height is displaced by about the same share of the cell's, far below a grey level.
+// Method:  scan from above, stepping down by |f| / L, L a bound of |df/dz|, and by kScanStepMin_um at least: nothing
+//          is stepped over but a lobe thinner than that. Only the band is scanned where the noise can decide the sign.
+//          Both the band and L come from bounds of the noise on this very column: cells lie flat, so along z the
+//          in-plane factors of Gardner's product hardly change, and their values in the middle bound them far better
+//          than their amplitude does. f is evaluated along the column with a sine of its own: within kColumnFieldError of
+//          Body::field, the reference, and three times as fast. A height is displaced by about the same share of the
+//          cell's, far below a grey level.
 // Units:   um.
 // Errors:  none.      Threads: pure.
 #pragma once
@@ -61,10 +62,10 @@ class ColumnScan {
 
  private:
   const Body& body_;
-  Vec3 step_;              // change of (u, v, w) per um of z
+  Vec3 step_;  // change of (u, v, w) per um of z
   double step_squared_;
-  Vec3 rate_;              // |step_|, component by component
-  Vec3 factor_slope_;      // of Gx, Gy, Gz, at most, per um of z
+  Vec3 rate_;          // |step_|, component by component
+  Vec3 factor_slope_;  // of Gx, Gy, Gz, at most, per um of z
 };
 
 }  // namespace colony

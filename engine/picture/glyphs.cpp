@@ -83,7 +83,8 @@ std::int64_t text_width_px(std::string_view text) {
   return count == 0 ? 0 : count * kGlyphAdvance_px - (kGlyphAdvance_px - kGlyphWidth_px);
 }
 
-void draw_text(Picture& picture, std::int64_t row, std::int64_t column, std::string_view text, std::int64_t scale, Rgb colour) {
+void draw_text(Picture& picture, std::int64_t row, std::int64_t column, std::string_view text, std::int64_t scale,
+               Rgb colour) {
   while (!text.empty()) {
     const Glyph& glyph = glyph_of(take_code(text));
     for (std::int64_t y = 0; y < kGlyphHeight_px; ++y) {

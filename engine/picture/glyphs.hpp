@@ -13,12 +13,13 @@ namespace colony {
 inline constexpr std::int64_t kGlyphWidth_px = 5;
 inline constexpr std::int64_t kGlyphAdvance_px = 6;
 inline constexpr std::int64_t kGlyphAscent_px = 7;
-inline constexpr std::int64_t kGlyphHeight_px = 9;    // with the part below the line
+inline constexpr std::int64_t kGlyphHeight_px = 9;  // with the part below the line
 
 /// Width of `text` without the space after its last glyph, at scale 1.
 std::int64_t text_width_px(std::string_view text);
 
 /// Draws `text` with its upper left corner at (row, column), every dot `scale` pixels wide.
-void draw_text(Picture& picture, std::int64_t row, std::int64_t column, std::string_view text, std::int64_t scale, Rgb colour);
+void draw_text(Picture& picture, std::int64_t row, std::int64_t column, std::string_view text, std::int64_t scale,
+               Rgb colour);
 
 }  // namespace colony

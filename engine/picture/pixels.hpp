@@ -30,7 +30,8 @@ struct Rgb {
 /// `from` at share 0, `to` at share 1, straight in the stored (sRGB) values.
 inline Rgb blend(Rgb from, Rgb to, double share) {
   const auto mix = [share](std::uint8_t a, std::uint8_t b) {
-    return static_cast<std::uint8_t>(static_cast<double>(a) + (static_cast<double>(b) - static_cast<double>(a)) * share + 0.5);
+    return static_cast<std::uint8_t>(static_cast<double>(a) +
+                                     (static_cast<double>(b) - static_cast<double>(a)) * share + 0.5);
   };
   return {mix(from.red, to.red), mix(from.green, to.green), mix(from.blue, to.blue)};
 }
@@ -53,8 +54,8 @@ inline void put_pixel(Picture& picture, std::int64_t row, std::int64_t column, R
 }
 
 /// The rectangle of rows [row, row + height) and columns [column, column + width).
-inline void fill_rectangle(Picture& picture, std::int64_t row, std::int64_t column, std::int64_t height, std::int64_t width,
-                           Rgb colour) {
+inline void fill_rectangle(Picture& picture, std::int64_t row, std::int64_t column, std::int64_t height,
+                           std::int64_t width, Rgb colour) {
   for (std::int64_t r = row; r < row + height; ++r) {
     for (std::int64_t c = column; c < column + width; ++c) put_pixel(picture, r, c, colour);
   }

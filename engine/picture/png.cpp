@@ -13,12 +13,12 @@ struct FreeContext {
   void operator()(spng_ctx* context) const { spng_ctx_free(context); }
 };
 struct FreeBuffer {
-  void operator()(void* buffer) const { std::free(buffer); }   // libspng's buffers come from malloc
+  void operator()(void* buffer) const { std::free(buffer); }  // libspng's buffers come from malloc
 };
 
 constexpr std::uint8_t kPerceptualIntent = 0;
 constexpr std::uint8_t kUnitMetre = 1;
-constexpr double kPixelsPerMetreMax = 2147483647.0;    // PNG's largest integer
+constexpr double kPixelsPerMetreMax = 2147483647.0;  // PNG's largest integer
 constexpr double kUmPerMetre = 1e6;
 
 }  // namespace
@@ -40,7 +40,8 @@ std::string encode_png(const Picture& picture) {
   CHECK(spng_set_ihdr(context.get(), &header) == 0);
   CHECK(spng_set_srgb(context.get(), kPerceptualIntent) == 0);
 
-  // A pixel below half a nanometre or above a metre cannot be said in whole pixels per metre: then the chunk is left out.
+  // A pixel below half a nanometre or above a metre cannot be said in whole pixels per metre: then the chunk is left
+  // out.
   const double per_metre = kUmPerMetre / picture.um_per_px + 0.5;
   if (per_metre >= 1.0 && per_metre < kPixelsPerMetreMax) {
     spng_phys physical{};
@@ -50,7 +51,8 @@ std::string encode_png(const Picture& picture) {
     CHECK(spng_set_phys(context.get(), &physical) == 0);
   }
 
-  CHECK(spng_encode_image(context.get(), picture.rgb.data(), picture.rgb.size(), SPNG_FMT_PNG, SPNG_ENCODE_FINALIZE) == 0);
+  CHECK(spng_encode_image(context.get(), picture.rgb.data(), picture.rgb.size(), SPNG_FMT_PNG, SPNG_ENCODE_FINALIZE) ==
+        0);
   std::size_t size = 0;
   int status = 0;
   const std::unique_ptr<void, FreeBuffer> bytes(spng_get_png_buffer(context.get(), &size, &status));

@@ -22,10 +22,11 @@ struct Extent {
   double left_um, right_um, bottom_um, top_um;
 };
 
-/// The boxes of all bodies and the margin: the same on every side, a share of the longer extent, so that a low wide colony
-/// has room for its scale bar too.
+/// The boxes of all bodies and the margin: the same on every side, a share of the longer extent, so that a low wide
+/// colony has room for its scale bar too.
 Extent extent_of(const Colony& colony) {
-  if (colony.cells().empty()) return {-kEmptySide_um / 2.0, kEmptySide_um / 2.0, -kEmptySide_um / 2.0, kEmptySide_um / 2.0};
+  if (colony.cells().empty())
+    return {-kEmptySide_um / 2.0, kEmptySide_um / 2.0, -kEmptySide_um / 2.0, kEmptySide_um / 2.0};
   const Box& first = colony.body(colony.cells().front().id).box();
   Extent extent{first.low.x(), first.high.x(), first.low.y(), first.high.y()};
   for (const Cell& cell : colony.cells()) {
@@ -35,9 +36,9 @@ Extent extent_of(const Colony& colony) {
     extent.bottom_um = std::min(extent.bottom_um, box.low.y());
     extent.top_um = std::max(extent.top_um, box.high.y());
   }
-  const double margin_um =
-      kMarginShare * std::max(extent.right_um - extent.left_um, extent.top_um - extent.bottom_um);
-  return {extent.left_um - margin_um, extent.right_um + margin_um, extent.bottom_um - margin_um, extent.top_um + margin_um};
+  const double margin_um = kMarginShare * std::max(extent.right_um - extent.left_um, extent.top_um - extent.bottom_um);
+  return {extent.left_um - margin_um, extent.right_um + margin_um, extent.bottom_um - margin_um,
+          extent.top_um + margin_um};
 }
 
 Error refuse(ErrorCode code, const char* parameter, std::string message) {
@@ -62,7 +63,8 @@ Result<Frame> frame_of(const Extent& extent, const PictureSpec& spec) {
   const double height = sides_px(height_um, um_per_px);
   // Compared as doubles: only what is known to be small becomes an integer.
   if (!(width <= side_max && height <= side_max)) {
-    return refuse(ErrorCode::kLimit, parameter, "makes a side longer than " + std::to_string(kPictureSideMax_px) + " pixels");
+    return refuse(ErrorCode::kLimit, parameter,
+                  "makes a side longer than " + std::to_string(kPictureSideMax_px) + " pixels");
   }
   Frame frame;
   frame.um_per_px = um_per_px;
@@ -94,7 +96,8 @@ Result<Picture> render(const Colony& colony, const Params&, const PictureSpec& s
   const CellColours colours = shaded ? colour_cells(colony, spec.colour_by) : CellColours{};
   for (std::int64_t row = 0; row < frame.height_px; row += kStripRows_px) {
     const RowRange rows{row, std::min(row + kStripRows_px, frame.height_px)};
-    const RowRange read{std::max<std::int64_t>(0, rows.first - kStyleHalo_px), std::min(rows.end + kStyleHalo_px, frame.height_px)};
+    const RowRange read{std::max<std::int64_t>(0, rows.first - kStyleHalo_px),
+                        std::min(rows.end + kStyleHalo_px, frame.height_px)};
     const TopView view = top_view(colony, frame, read);
     if (shaded) {
       paint_shaded(view, rows, colours.of_cell, picture);

@@ -17,11 +17,13 @@ std::uint32_t owner_at(const TopView& view, std::int64_t row, std::int64_t colum
   return view.owner[view.index(row, column)];
 }
 
-/// Rise of the height per um from one side to the other of a pixel, over those of the two neighbours that are the same cell:
-/// a step to another cell is a border, not a slope.
+/// Rise of the height per um from one side to the other of a pixel, over those of the two neighbours that are the same
+/// cell: a step to another cell is a border, not a slope.
 double rise(const TopView& view, std::int64_t row, std::int64_t column, std::int64_t down, std::int64_t right) {
   const std::uint32_t owner = owner_at(view, row, column);
-  const auto height = [&](std::int64_t r, std::int64_t c) { return static_cast<double>(view.height_um[view.index(r, c)]); };
+  const auto height = [&](std::int64_t r, std::int64_t c) {
+    return static_cast<double>(view.height_um[view.index(r, c)]);
+  };
   const bool before = owner_at(view, row - down, column - right) == owner;
   const bool after = owner_at(view, row + down, column + right) == owner;
   if (!before && !after) return 0.0;
@@ -32,24 +34,26 @@ double rise(const TopView& view, std::int64_t row, std::int64_t column, std::int
 
 double brightness(const TopView& view, std::int64_t row, std::int64_t column) {
   const double slope_x = rise(view, row, column, 0, 1);
-  const double slope_y = -rise(view, row, column, 1, 0);   // rows run down, y up
+  const double slope_y = -rise(view, row, column, 1, 0);  // rows run down, y up
   const double along = kLightZ - slope_x * kLightX - slope_y * kLightY;
   const double diffuse = std::max(0.0, along / std::sqrt(1.0 + slope_x * slope_x + slope_y * slope_y));
   return kAmbient + kDiffuse * diffuse;
 }
 
-/// How much of each pixel of a cell lies under the border line, 0..1: from the distance of the pixel's centre to the nearest
-/// pixel of its own cell that has a foreign 4-neighbour.
+/// How much of each pixel of a cell lies under the border line, 0..1: from the distance of the pixel's centre to the
+/// nearest pixel of its own cell that has a foreign 4-neighbour.
 std::vector<float> border_shares(const TopView& view) {
   const std::int64_t width = view.frame.width_px;
-  const double half_width_px = std::min(kBorderHalfWidth_um / view.frame.um_per_px, static_cast<double>(kBorderHalfWidthMax_px));
+  const double half_width_px =
+      std::min(kBorderHalfWidth_um / view.frame.um_per_px, static_cast<double>(kBorderHalfWidthMax_px));
   const std::int64_t reach = ceil_to_int(half_width_px);
   std::vector<float> shares(view.owner.size(), 0.0f);
   for (std::int64_t row = view.rows.first; row < view.rows.end; ++row) {
     for (std::int64_t column = 0; column < width; ++column) {
       const std::uint32_t owner = view.owner[view.index(row, column)];
       if (owner == 0) continue;
-      // Rows outside the strip count as the same cell: they are another strip's business, and the halo keeps them out of reach.
+      // Rows outside the strip count as the same cell: they are another strip's business, and the halo keeps them out
+      // of reach.
       const bool inner = (!view.has_row(row - 1) || owner_at(view, row - 1, column) == owner) &&
                          (!view.has_row(row + 1) || owner_at(view, row + 1, column) == owner) &&
                          owner_at(view, row, column - 1) == owner && owner_at(view, row, column + 1) == owner;

@@ -29,63 +29,18 @@ struct Placement {
 };
 
 // Buffers grow and never shrink: shrinking and growing again would clear them each time.
-template <class T>
-void reserve_size(std::vector<T>& buffer, std::size_t n) {
-  if (buffer.size() < n) buffer.resize(n);
+void hold(std::vector<float>& buffer, std::size_t n) {
+  if (buffer.size() < n + kernel::kPadding) buffer.resize(n + kernel::kPadding);
 }
 
 void place(const Placement& placement, const PointSet& points, OverlapScratch& s) {
   const std::size_t n = points.size();
-  reserve_size(s.x, n);
-  reserve_size(s.y, n);
-  reserve_size(s.z, n);
+  hold(s.x, n);
+  hold(s.y, n);
+  hold(s.z, n);
   for (std::size_t i = 0; i < n; ++i) s.x[i] = placement.low[0] + points.x[i] * placement.extent[0];
   for (std::size_t i = 0; i < n; ++i) s.y[i] = placement.low[1] + points.y[i] * placement.extent[1];
   for (std::size_t i = 0; i < n; ++i) s.z[i] = placement.low[2] + points.z[i] * placement.extent[2];
-}
-
-// How many of n points are inside; is_inside[i] says which, unless none can be (then it is not written and 0 is returned).
-// The sign of f is decided without the noise outside the band; the band's points are gathered for the noise.
-std::uint32_t classify(const FloatBody& body, const float* x, const float* y, const float* z, std::size_t n, OverlapScratch& s) {
-  reserve_size(s.smooth, n);
-  reserve_size(s.is_inside, n);
-  reserve_size(s.band_index, n + 1);
-  const float* const smooth = s.smooth.data();
-  const float band = body.band;
-  kernel::smooth_field(body, x, y, z, n, s.smooth.data());
-  std::int32_t near_count = 0;
-  for (std::size_t i = 0; i < n; ++i) near_count += smooth[i] >= -band ? 1 : 0;
-  if (near_count == 0) return 0;
-
-  std::size_t band_count = 0;
-  std::uint32_t count = 0;
-  for (std::size_t i = 0; i < n; ++i) {
-    const float f = smooth[i];
-    const bool inside = f > band;
-    s.is_inside[i] = inside ? 1 : 0;
-    count += inside ? 1U : 0U;
-    s.band_index[band_count] = static_cast<std::uint32_t>(i);  // overwritten unless the next line counts it
-    band_count += (f <= band && f >= -band) ? 1U : 0U;
-  }
-  reserve_size(s.band_u, band_count);
-  reserve_size(s.band_v, band_count);
-  reserve_size(s.band_w, band_count);
-  reserve_size(s.band_noise, band_count);
-  for (std::size_t k = 0; k < band_count; ++k) {
-    const std::size_t i = s.band_index[k];
-    const kernel::Unit p = kernel::to_unit(body, x[i], y[i], z[i]);
-    s.band_u[k] = p.u;
-    s.band_v[k] = p.v;
-    s.band_w[k] = p.w;
-  }
-  kernel::noise(body, s.band_u.data(), s.band_v.data(), s.band_w.data(), band_count, s.band_noise.data());
-  for (std::size_t k = 0; k < band_count; ++k) {
-    const std::size_t i = s.band_index[k];
-    const bool inside = smooth[i] + s.band_noise[k] >= 0.0F;
-    s.is_inside[i] = inside ? 1 : 0;
-    count += inside ? 1U : 0U;
-  }
-  return count;
 }
 
 bool beyond_wall(const Placement& placement, double wall_radius_um, float x, float y) {
@@ -122,27 +77,22 @@ void count_overlaps(const Body& body, std::span<const Body* const> neighbours, s
 
   const Placement placement(body.box());
   place(placement, points, s);
-  out.hit_count = classify(FloatBody(body, placement.origin), s.x.data(), s.y.data(), s.z.data(), n, s);
+  hold(s.inside_x, n);
+  hold(s.inside_y, n);
+  hold(s.inside_z, n);
+  out.hit_count = kernel::select_inside(FloatBody(body, placement.origin), s.x.data(), s.y.data(), s.z.data(), n, s.band,
+                                        s.inside_x.data(), s.inside_y.data(), s.inside_z.data());
   if (out.hit_count == 0) return;
-  reserve_size(s.inside_x, n + 1);
-  reserve_size(s.inside_y, n + 1);
-  reserve_size(s.inside_z, n + 1);
-  std::size_t inside = 0;
-  for (std::size_t i = 0; i < n; ++i) {  // branch-free compaction: the slot is overwritten unless the point is inside
-    s.inside_x[inside] = s.x[i];
-    s.inside_y[inside] = s.y[i];
-    s.inside_z[inside] = s.z[i];
-    inside += s.is_inside[i];
-  }
   if (wall_radius_um) {
-    for (std::size_t i = 0; i < inside; ++i) {
+    for (std::size_t i = 0; i < out.hit_count; ++i) {
       if (beyond_wall(placement, *wall_radius_um, s.inside_x[i], s.inside_y[i])) ++out.outside_wall_count;
     }
   }
   for (std::size_t j = 0; j < neighbours.size(); ++j) {
     if (!meets(neighbours[j]->box(), body.box()) || separated(*neighbours[j], body)) continue;
     const FloatBody other(*neighbours[j], placement.origin);
-    out.shared_counts[j] = classify(other, s.inside_x.data(), s.inside_y.data(), s.inside_z.data(), inside, s);
+    out.shared_counts[j] =
+        kernel::count_inside(other, s.inside_x.data(), s.inside_y.data(), s.inside_z.data(), out.hit_count, s.band);
   }
 }
 
@@ -155,13 +105,7 @@ OverlapCounts count_overlaps_reference(const Body& body, std::span<const Body* c
   if (body.box().empty()) return out;
   const Placement placement(body.box());
   const auto inside = [&](const Body& which, float x, float y, float z) {
-    const FloatBody prepared(which, placement.origin);
-    const kernel::Unit p = kernel::to_unit(prepared, x, y, z);
-    float noise = 0.0F;
-    float smooth = 0.0F;
-    kernel::smooth_field(prepared, &x, &y, &z, 1, &smooth);
-    kernel::noise(prepared, &p.u, &p.v, &p.w, 1, &noise);
-    return smooth + noise >= 0.0F;
+    return kernel::is_inside_reference(FloatBody(which, placement.origin), x, y, z);
   };
   for (std::size_t i = 0; i < points.size(); ++i) {
     const float x = placement.low[0] + points.x[i] * placement.extent[0];

@@ -32,7 +32,8 @@ inline Cell ball_at(double x_um, double y_um, double radius_um) {
   return cell_at(x_um, y_um, Vec3(radius_um, radius_um, radius_um));
 }
 
-/// `count` different cells as the model makes them, tilted and noisy, scattered over a square of `side_um`: they overlap if it is small.
+/// `count` different cells as the model makes them, tilted and noisy, scattered over a square of `side_um`: they
+/// overlap if it is small.
 inline std::vector<Cell> scattered_cells(int count, double side_um, Seed seed) {
   std::vector<Cell> cells;
   for (int i = 0; i < count; ++i) {
@@ -42,7 +43,8 @@ inline std::vector<Cell> scattered_cells(int count, double side_um, Seed seed) {
     const double b_um = stream.uniform({4.5, 6.5});
     Cell cell = cell_at(stream.uniform({-0.5, 0.5}) * side_um, stream.uniform({-0.5, 0.5}) * side_um,
                         Vec3(elongation * b_um, b_um, flatness * std::sqrt(elongation) * b_um));
-    cell.rotation_rad = Vec3(stream.uniform({-0.07, 0.07}), stream.uniform({-0.07, 0.07}), stream.uniform({0.0, maths::kPi}));
+    cell.rotation_rad =
+        Vec3(stream.uniform({-0.07, 0.07}), stream.uniform({-0.07, 0.07}), stream.uniform({0.0, maths::kPi}));
     for (int axis = 0; axis < 3; ++axis) cell.noise_offset[axis] = stream.uniform({0.0, noise_period(paper().noise)});
     cell.volume_um3 = volume_above_dish_um3({cell.centre_um, cell.semiaxes_um, cell.rotation_rad, cell.noise_offset});
     cells.push_back(cell);

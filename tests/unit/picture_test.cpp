@@ -1,5 +1,3 @@
-#include "engine/picture/render.hpp"
-
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -10,6 +8,7 @@
 #include "engine/picture/annotate.hpp"
 #include "engine/picture/colour.hpp"
 #include "engine/picture/glyphs.hpp"
+#include "engine/picture/render.hpp"
 #include "engine/picture/styles.hpp"
 #include "engine/picture/top_view.hpp"
 #include "tests/support/founding.hpp"
@@ -61,7 +60,8 @@ TEST(Picture, FrameIsTheBodiesAndAMarginOfOneTwentieth) {
   const Picture by_width = *render(colony, params, PictureSpec{});
   EXPECT_EQ(by_width.width_px, 1024);
   EXPECT_NEAR(by_width.um_per_px, (width_um + 2.0 * margin_um) / 1024.0, 1e-9);
-  EXPECT_EQ(by_width.height_px, static_cast<std::int64_t>(std::ceil((height_um + 2.0 * margin_um) / by_width.um_per_px)));
+  EXPECT_EQ(by_width.height_px,
+            static_cast<std::int64_t>(std::ceil((height_um + 2.0 * margin_um) / by_width.um_per_px)));
   EXPECT_NEAR(by_width.left_um, -56.0 - margin_um, 1e-9);
   EXPECT_NEAR(by_width.top_um, 46.0 + margin_um, by_width.um_per_px);
   EXPECT_EQ(by_width.rgb.size(), static_cast<std::size_t>(3 * by_width.width_px * by_width.height_px));
@@ -91,8 +91,8 @@ TEST(Picture, YPointsUpAndXToTheRight) {
   }
   ASSERT_GT(green, 100);
   ASSERT_GT(purple, 100);
-  EXPECT_GT(green_rows / green, purple_rows / purple);            // the active cell lies below
-  EXPECT_LT(green_columns / green, purple_columns / purple);      // and to the left
+  EXPECT_GT(green_rows / green, purple_rows / purple);        // the active cell lies below
+  EXPECT_LT(green_columns / green, purple_columns / purple);  // and to the left
 }
 
 TEST(Picture, LightComesFromTheUpperLeft) {
@@ -101,7 +101,8 @@ TEST(Picture, LightComesFromTheUpperLeft) {
   cells[0].nucleus_radius_um = 0.5;
   const Picture picture = *render(found(params, cells), params, of_width(200));
   const std::int64_t middle = 100, off = 55;
-  EXPECT_GT(luminance(pixel(picture, middle - off, middle - off)), luminance(pixel(picture, middle + off, middle + off)) + 60.0);
+  EXPECT_GT(luminance(pixel(picture, middle - off, middle - off)),
+            luminance(pixel(picture, middle + off, middle + off)) + 60.0);
 }
 
 TEST(Picture, ColonyWithoutCellsIsABackgroundOf100Um) {
@@ -136,7 +137,8 @@ TEST(Picture, LimitsAreRefusedByTheirNames) {
   EXPECT_EQ(refused_field(colony, of_scale(-0.5), ErrorCode::kInvalid), "um_per_px");
   EXPECT_EQ(refused_field(colony, of_scale(1e-300), ErrorCode::kInvalid), "um_per_px");
   EXPECT_EQ(refused_field(colony, of_scale(1e300), ErrorCode::kInvalid), "um_per_px");
-  EXPECT_EQ(refused_field(colony, of_scale(std::numeric_limits<double>::quiet_NaN()), ErrorCode::kInvalid), "um_per_px");
+  EXPECT_EQ(refused_field(colony, of_scale(std::numeric_limits<double>::quiet_NaN()), ErrorCode::kInvalid),
+            "um_per_px");
   EXPECT_EQ(refused_field(colony, of_scale(std::numeric_limits<double>::infinity()), ErrorCode::kInvalid), "um_per_px");
   // The width fits, the height that follows from it does not.
   const Colony tall = found(paper(), {ball_at(0.0, -500.0, 7.0), ball_at(0.0, 500.0, 7.0)});
@@ -251,7 +253,8 @@ TEST(Picture, ScaleBarIsAsLongAsItsLabelSays) {
   }
   Picture wide;
   wide.width_px = wide.height_px = 1000;
-  for (const auto& [um_per_px, label] : {std::pair{0.001, "0.2 µm"}, {0.01, "2 µm"}, {0.3, "50 µm"}, {1.0, "200 µm"}, {5.0, "1 mm"}, {80.0, "10 mm"}}) {
+  for (const auto& [um_per_px, label] :
+       {std::pair{0.001, "0.2 µm"}, {0.01, "2 µm"}, {0.3, "50 µm"}, {1.0, "200 µm"}, {5.0, "1 mm"}, {80.0, "10 mm"}}) {
     wide.um_per_px = um_per_px;
     EXPECT_EQ(scale_bar_of(wide).label, label);
   }
@@ -277,10 +280,14 @@ TEST(Picture, ColoursFollowTheQuantity) {
   cells[1].activity = Activity::kPassive, cells[2].activity = Activity::kSenescent;
   const Colony colony = found(paper(), cells, 10.0);
   using Colours = std::vector<Rgb>;
-  EXPECT_EQ(colour_cells(colony, ColourBy::kActivity).of_cell, (Colours{kActiveColour, kPassiveColour, kSenescentColour}));
-  EXPECT_EQ(colour_cells(colony, ColourBy::kVolume).of_cell, (Colours{map_colour(0.0), map_colour(1.0), map_colour(0.5)}));
-  EXPECT_EQ(colour_cells(colony, ColourBy::kGeneration).of_cell, (Colours{map_colour(0.5), map_colour(0.0), map_colour(1.0)}));
-  EXPECT_EQ(colour_cells(colony, ColourBy::kAge).of_cell, (Colours{map_colour(1.0), map_colour(0.0), map_colour(0.25)}));
+  EXPECT_EQ(colour_cells(colony, ColourBy::kActivity).of_cell,
+            (Colours{kActiveColour, kPassiveColour, kSenescentColour}));
+  EXPECT_EQ(colour_cells(colony, ColourBy::kVolume).of_cell,
+            (Colours{map_colour(0.0), map_colour(1.0), map_colour(0.5)}));
+  EXPECT_EQ(colour_cells(colony, ColourBy::kGeneration).of_cell,
+            (Colours{map_colour(0.5), map_colour(0.0), map_colour(1.0)}));
+  EXPECT_EQ(colour_cells(colony, ColourBy::kAge).of_cell,
+            (Colours{map_colour(1.0), map_colour(0.0), map_colour(0.25)}));
   EXPECT_EQ(colour_cells(colony, ColourBy::kVolume).scale.low_text, "500 µm³");
   EXPECT_EQ(colour_cells(colony, ColourBy::kVolume).scale.high_text, "1500 µm³");
   EXPECT_EQ(colour_cells(colony, ColourBy::kAge).scale.high_text, "10.0 h");
@@ -311,7 +318,7 @@ TEST(Picture, TextIsDrawnDotByDot) {
     }
   }
   EXPECT_EQ(drawn, ".##....#....#....#....#....#...###.");
-  draw_text(picture, 15, 25, "µm³", 3, kWhite);   // runs over the edge: cut, not refused
+  draw_text(picture, 15, 25, "µm³", 3, kWhite);  // runs over the edge: cut, not refused
   draw_text(picture, -5, -4, "8", 2, kWhite);
 }
 

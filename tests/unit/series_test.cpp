@@ -62,9 +62,10 @@ TEST(Series, AreaIsAUnionNotASum) {
   const double one = measure_series(found(params, {ball_at(0.0, 0.0, 7.0)}), 0.0).area_um2;
   const double same = measure_series(found(params, {ball_at(0.0, 0.0, 7.0), ball_at(0.0, 0.0, 7.0)}), 0.0).area_um2;
   const double apart = measure_series(found(params, {ball_at(0.0, 0.0, 7.0), ball_at(40.0, 0.0, 7.0)}), 0.0).area_um2;
-  const double overlapping = measure_series(found(params, {ball_at(0.0, 0.0, 7.0), ball_at(7.0, 0.0, 7.0)}), 0.0).area_um2;
+  const double overlapping =
+      measure_series(found(params, {ball_at(0.0, 0.0, 7.0), ball_at(7.0, 0.0, 7.0)}), 0.0).area_um2;
   EXPECT_EQ(same, one);
-  EXPECT_EQ(apart, 2.0 * one);   // by a whole number of grid cells
+  EXPECT_EQ(apart, 2.0 * one);  // by a whole number of grid cells
   // Two discs at distance d = R share 2 R^2 (pi/3 - sqrt(3)/4).
   EXPECT_NEAR(2.0 * one - overlapping, 2.0 * 49.0 * (maths::kPi / 3.0 - std::sqrt(3.0) / 4.0), 8.0);
 }
@@ -86,7 +87,8 @@ TEST(Series, AreaDoesNotCareHowFarApartTheCellsLie) {
 }
 
 TEST(Series, VolumesAndCounts) {
-  std::vector<Cell> cells = {ball_at(0.0, 0.0, 5.0), ball_at(20.0, 0.0, 5.0), ball_at(40.0, 0.0, 5.0), ball_at(60.0, 0.0, 5.0)};
+  std::vector<Cell> cells = {ball_at(0.0, 0.0, 5.0), ball_at(20.0, 0.0, 5.0), ball_at(40.0, 0.0, 5.0),
+                             ball_at(60.0, 0.0, 5.0)};
   cells[0].volume_um3 = 400.0;
   cells[1].volume_um3 = 600.0;
   cells[2].volume_um3 = 800.0;
@@ -100,7 +102,7 @@ TEST(Series, VolumesAndCounts) {
   EXPECT_EQ(row.passive_count, 2u);
   EXPECT_EQ(row.senescent_count, 1u);
   EXPECT_DOUBLE_EQ(row.volume_mean_um3, 700.0);
-  EXPECT_DOUBLE_EQ(row.volume_sd_um3, std::sqrt(50000.0));   // of the population: (300^2 + 100^2) / 2
+  EXPECT_DOUBLE_EQ(row.volume_sd_um3, std::sqrt(50000.0));  // of the population: (300^2 + 100^2) / 2
 }
 
 }  // namespace

@@ -68,7 +68,7 @@ TEST(TopView, BallHasItsAreaAndHeight) {
 
 TEST(TopView, EqualNeighboursMeetInTheMidPlane) {
   const Colony colony = found(paper_without_noise(), {ball_at(-4.0, 0.0, 7.0), ball_at(4.0, 0.0, 7.0)});
-  const TopView view = top_view(colony, square_frame(26.0, 333));   // odd: one column lies on the plane itself
+  const TopView view = top_view(colony, square_frame(26.0, 333));  // odd: one column lies on the plane itself
   std::int64_t left = 0, right = 0;
   for (std::int64_t row = 0; row < 333; ++row) {
     for (std::int64_t column = 0; column < 333; ++column) {
@@ -107,7 +107,8 @@ TEST(TopView, OverlappingTripleIsSharedByTheNearestCentre) {
   for (const int count : counts) EXPECT_GT(count, 3000);
 }
 
-// Under the middle of three deeply overlapping cells the rule `sum` leaves a void and `max` does not; from above both look alike.
+// Under the middle of three deeply overlapping cells the rule `sum` leaves a void and `max` does not; from above both
+// look alike.
 TEST(TopView, ShowsTheSameUnderBothContactRules) {
   std::vector<Cell> cells;
   for (int i = 0; i < 3; ++i) {
@@ -141,7 +142,7 @@ TEST(TopView, ShowsTheSameUnderBothContactRules) {
         }
       }
       EXPECT_GT(compared, 250);
-      EXPECT_LE(owners_differ, compared / 100);   // pixels on a border, where the tops differ by less than a step
+      EXPECT_LE(owners_differ, compared / 100);  // pixels on a border, where the tops differ by less than a step
     }
   }
 }
@@ -162,7 +163,8 @@ TEST(TopView, ColumnFieldIsTheBodysField) {
 }
 
 TEST(TopView, NothingOfTheBodyStandsAboveItsTop) {
-  for (const NoiseParams noise : {NoiseParams{0.40, 5.0, 1.4}, NoiseParams{0.45, 5.0, 6.2}, NoiseParams{0.40, 8.0, 1.4}}) {
+  for (const NoiseParams noise :
+       {NoiseParams{0.40, 5.0, 1.4}, NoiseParams{0.45, 5.0, 6.2}, NoiseParams{0.40, 8.0, 1.4}}) {
     Params params = paper();
     params.noise = noise;
     const Colony colony = found(params, scattered_cells(12, 10.0, 11));
@@ -210,7 +212,7 @@ TEST(TopView, NoiseLimitsHold) {
       }
     }
   }
-  EXPECT_LT(tightest, 0.6);   // or they would earn nothing
+  EXPECT_LT(tightest, 0.6);  // or they would earn nothing
 }
 
 TEST(TopView, RowsDoNotDependOnTheStripTheyAreIn) {
