@@ -7,6 +7,8 @@
 
 namespace colony {
 
+[[noreturn]] void fail_check(const char* condition, const char* file, int line);
+
 class CheckFailure : public std::logic_error {
  public:
   using std::logic_error::logic_error;
@@ -26,8 +28,6 @@ class FailureContext {
   std::string text_;
   FailureContext* outer_;
 };
-
-[[noreturn]] void fail_check(const char* condition, const char* file, int line);
 
 }  // namespace colony
 

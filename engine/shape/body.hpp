@@ -48,6 +48,8 @@ class Body {
   double field(const Vec3& point_um) const;
   /// 1 - u^2 - v^2 - w^2 at p, without noise.
   double smooth_field(const Vec3& point_um) const;
+  /// f >= 0 and z >= 0 at p, without the noise where its bound allows.
+  bool contains(const Vec3& point_um) const;
   /// Bounding box of the noisy body above the dish: semiaxes times sqrt(1 + bound), rotated, clipped at z >= 0.
   const Box& box() const { return box_; }
   /// Half extent of the noise-free ellipsoid along a unit vector, um.
@@ -56,8 +58,6 @@ class Body {
   bool footprint_contains(double x_um, double y_um) const;
   /// Half extents of that projection along x and y, um.
   Vec2 footprint_half_extent_um() const;
-  /// Largest height z of the noisy body's bounding box and so on are in box().
-
   const Vec3& centre_um() const { return centre_; }
   const Vec3& semiaxes_um() const { return semiaxes_; }
   /// Rows: the cell's axes divided by the semiaxes, so (u, v, w) = to_unit() * (p - centre).
@@ -76,6 +76,11 @@ class Body {
   Box box_;
   double footprint_xx_ = 1.0, footprint_xy_ = 0.0, footprint_yy_ = 1.0;  // inverse of the shadow's 2x2 form
 };
+
+/// Gardner's series at (u, v, w), offset not added; |noise| <= noise_bound(params).
+double gardner_noise(double u, double v, double w, const NoiseParams& params);
+/// The period of the series along each axis, 54 pi / q: offsets are drawn uniformly over it.
+double noise_period(const NoiseParams& params);
 
 /// Volume of the noise-free ellipsoid above the dish, um^3, analytic.
 double volume_above_dish_um3(const BodyGeometry& geometry);

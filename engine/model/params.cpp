@@ -1,0 +1,183 @@
+#include "engine/model/params.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "engine/base/maths.hpp"
+
+namespace colony {
+namespace {
+
+std::string pointer_of(std::string_view path) {
+  std::string pointer = "/" + std::string(path);
+  std::replace(pointer.begin(), pointer.end(), '.', '/');
+  return pointer;
+}
+
+std::string text_of(double value) {
+  std::string text = std::to_string(value);
+  text.erase(text.find_last_not_of('0') + 1);
+  if (text.back() == '.') text.pop_back();
+  return text;
+}
+
+std::string range_text(const ParamInfo& info) {
+  return "must be within " + text_of(info.min) + " to " + text_of(info.max) +
+         (info.unit.empty() ? "" : " " + std::string(info.unit));
+}
+
+bool inside(const ParamInfo& info, double value) { return value >= info.min && value <= info.max; }  // false for NaN
+
+// The violation of one row, if any.
+class RangeCheck {
+ public:
+  RangeCheck(const ParamInfo& info, Params& params, std::vector<FieldError>& errors)
+      : info_(info), params_(params), errors_(errors) {}
+
+  void operator()(Access<double> access) const { check(access(params_)); }
+  void operator()(Access<std::int64_t> access) const {
+    const std::int64_t value = access(params_);
+    check(static_cast<double>(value));
+    if (info_.power_of_two && inside(info_, static_cast<double>(value)) && (value & (value - 1)) != 0) {
+      add("", "must be a power of two");
+    }
+  }
+  void operator()(Access<bool>) const {}
+  void operator()(Access<Interval> access) const {
+    const Interval& interval = access(params_);
+    if (!inside(info_, interval.low)) add("/0", range_text(info_));
+    if (!inside(info_, interval.high)) add("/1", range_text(info_));
+    if (interval.low > interval.high) add("", "the first end must not exceed the second");
+  }
+  void operator()(Access<std::optional<double>> access) const {
+    if (access(params_)) check(*access(params_));
+  }
+  void operator()(Access<std::optional<std::int64_t>> access) const {
+    if (access(params_)) check(static_cast<double>(*access(params_)));
+  }
+  void operator()(const EnumAccess& access) const {
+    const int value = access.get(params_);
+    if (value < 0 || value >= static_cast<int>(access.names.size())) add("", "is not one of the names allowed");
+  }
+  void operator()(Access<std::vector<Vec2>> access) const {
+    const std::vector<Vec2>& points = access(params_);
+    if (points.size() > static_cast<std::size_t>(kFoundersMax)) {
+      add("", "must have at most " + std::to_string(kFoundersMax) + " positions");
+    }
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      for (int axis = 0; axis < 2; ++axis) {
+        if (!inside(info_, points[i][axis])) add("/" + std::to_string(i) + "/" + std::to_string(axis), range_text(info_));
+      }
+    }
+  }
+
+ private:
+  void check(double value) const {
+    if (!inside(info_, value)) add("", range_text(info_));
+  }
+  void add(const std::string& tail, std::string message) const {
+    errors_.push_back({pointer_of(info_.path) + tail, std::move(message)});
+  }
+
+  const ParamInfo& info_;
+  Params& params_;
+  std::vector<FieldError>& errors_;
+};
+
+void check_between_parameters(const Params& p, std::vector<FieldError>& errors) {
+  if (p.cycle.sd_h > p.cycle.mean_h / 4) errors.push_back({"/cycle/sd_h", "must be at most a quarter of mean_h"});
+  if (p.cycle.half_range_h > p.cycle.mean_h / 3) {
+    errors.push_back({"/cycle/half_range_h", "must be at most a third of mean_h"});
+  }
+  if (p.noise.amplitude > 0.40 && p.noise.frequency > 5.0) {
+    errors.push_back({"/noise/amplitude", "must be at most 0.4 where frequency is above 5: the cell would fall to pieces"});
+  }
+  if (p.contact.fitness_good < p.contact.fitness_min) {
+    errors.push_back({"/contact/fitness_good", "must be at least fitness_min"});
+  }
+  const double shortest_h = cycle_range_h(p).low;
+  if (!(shortest_h > p.division.settle_h + p.window_h)) {
+    errors.push_back({"/cycle/mean_h", "the shortest cycle that can be drawn, " + text_of(shortest_h) +
+                                           " h, must be longer than settle_h plus window_h, " +
+                                           text_of(p.division.settle_h + p.window_h) + " h"});
+  }
+  if (p.window_h > p.division.settle_h) errors.push_back({"/window_h", "must be at most division.settle_h"});
+  if (p.window_h > p.wake.retry_h) errors.push_back({"/window_h", "must be at most wake.retry_h"});
+  if (p.motility.rate_per_h > 0) {
+    errors.push_back({"/motility/rate_per_h", "moves are not simulated by this version; only 0 is accepted"});
+  }
+  if (p.layers != Layers::kMono) errors.push_back({"/layers", "only mono is simulated by this version"});
+}
+
+constexpr std::array<std::string_view, 2> kPresets = {"paper", "clonogenic"};
+
+}  // namespace
+
+std::span<const std::string_view> preset_names() { return kPresets; }
+
+std::string_view preset_text(std::string_view name) {
+  if (name == "paper") return "one cell grows into a contact-inhibited monolayer, with the parameters of the paper";
+  if (name == "clonogenic") return "100 founders over a disc of a 96-well plate's well: separate colonies in one dish";
+  return {};
+}
+
+std::optional<Params> preset(std::string_view name) {
+  Params params;
+  if (name == "paper") return params;
+  if (name == "clonogenic") {
+    // A well of a 96-well plate has a diameter of about 6.4 mm.
+    params.dish.radius_um = 3200.0;
+    params.founders.count = 100;
+    params.founders.radius_um = 2500.0;
+    return params;
+  }
+  return std::nullopt;
+}
+
+std::vector<FieldError> validate(const Params& params) {
+  Params copy = params;  // accessors give mutable references
+  std::vector<FieldError> errors;
+  for (const ParamInfo& info : param_table()) std::visit(RangeCheck(info, copy, errors), info.access);
+  if (errors.empty()) check_between_parameters(params, errors);
+  return errors;
+}
+
+Interval cycle_range_h(const Params& params) {
+  const CycleParams& cycle = params.cycle;
+  const double half = cycle.distribution == CycleDistribution::kNormal ? 3.0 * cycle.sd_h : cycle.half_range_h;
+  return {cycle.mean_h - half, cycle.mean_h + half};
+}
+
+double noise_bound(const NoiseParams& noise) {
+  // |G| <= a (1 + 1/1.17) on each axis, so the product is at most (1 + 1/1.17)^3 a^3 = 6.3796 a^3, rounded up.
+  return 6.380 * noise.amplitude * noise.amplitude * noise.amplitude;
+}
+
+namespace {
+/// sqrt(AB) of the largest cell that a division or a founding can make.
+double largest_mean_semiaxis_um(const Params& params) {
+  const double volume = params.cell.pair_volume_um3.high * (1.0 - params.cell.smaller_share.low);
+  return maths::cbrt(3.0 * volume / (4.0 * maths::kPi * params.cell.flatness.low));
+}
+/// Of the noise-free ellipsoid, in units of sqrt(AB): no axis is longer than the longest semiaxis.
+double longest_ratio(const Params& params) {
+  return std::max(std::sqrt(params.cell.elongation.high), params.cell.flatness.high);
+}
+constexpr double kRoundingMargin = 1.000001;  // bounds are compared with values computed along other paths
+}  // namespace
+
+double body_half_extent_max_um(const Params& params) {
+  return kRoundingMargin * largest_mean_semiaxis_um(params) * longest_ratio(params) *
+         std::sqrt(1.0 + noise_bound(params.noise));
+}
+
+double search_reach_um(const Params& params) {
+  // A candidate's centre lies at most distance * half-width along n and sideways * sqrt(AB) across it from the nucleus centre;
+  // a half-width is at most the longest semiaxis. Added (not in quadrature): a bound, not an estimate.
+  const double mean_semiaxis = largest_mean_semiaxis_um(params);
+  return kRoundingMargin * mean_semiaxis * (params.search.distance.high * longest_ratio(params) + params.search.sideways) +
+         body_half_extent_max_um(params);
+}
+
+}  // namespace colony

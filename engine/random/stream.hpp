@@ -1,0 +1,58 @@
+// stream: random numbers that are addressed, not drawn in sequence: Philox4x32-10.
+// Method:  key = the job's seed; counter = (cell id, the cell's ordinal, purpose (8 bits) and lane (24 bits), block).
+//          No generator state exists outside a Stream, so a history can be continued from any event.
+// Threads: a Stream is used by one thread; any number of Streams may exist.
+// Source:  Salmon et al. 2011, "Parallel random numbers: as easy as 1, 2, 3"; library Random123.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "engine/base/types.hpp"
+
+namespace colony {
+
+/// Why a number is drawn. Stored nowhere but in the meaning of a seed: never reuse or renumber.
+enum class Purpose : std::uint8_t {
+  kFounder = 1,          // a founder's body; lane 0
+  kFounderPlace = 2,     // lane = try
+  kCycle = 3,            // lane 0: the cell that keeps the id (or a founder), 1: the daughter
+  kNoiseOffset = 4,      // lane as kCycle
+  kIsolation = 5,        // scrambling: does the cell touch anybody?
+  kSplitDirection = 6,   // of an isolated cell
+  kSearch = 7,           // lane = generation: the genetic search
+  kSearchPoints = 8,     // scrambling of the search's points
+  kFinalPoints = 9,      // scrambling of the winner's fresh points
+  kSettlePoints = 10,    // lane 0: centre of mass, 1: nearest membrane
+  kFreeShare = 11,       // scrambling of the disc
+  kRetry = 12,           // next cycle after an unlucky search
+  kRetained = 13,        // scrambling: a neighbour's retained share; lane = 0
+};
+
+class Stream {
+ public:
+  Stream(Seed seed, CellId cell, std::uint32_t ordinal, Purpose purpose, std::uint32_t lane = 0);
+
+  std::uint32_t next_u32();
+  std::uint64_t next_u64();
+  /// Uniform in [0, 1), 53 bits.
+  double uniform();
+  /// Uniform in [low, high) (low if they are equal).
+  double uniform(const Interval& interval);
+  /// Uniform in 0..n-1 without bias; n >= 1.
+  std::uint32_t below(std::uint32_t n);
+  /// Standard normal (Box-Muller, one value a call).
+  double normal();
+
+ private:
+  std::array<std::uint32_t, 2> key_;
+  std::array<std::uint32_t, 4> counter_;
+  std::array<std::uint32_t, 4> block_{};
+  int used_ = 4;  // words of block_ given out
+};
+
+/// The raw function, for known-answer tests.
+std::array<std::uint32_t, 4> philox4x32_10(const std::array<std::uint32_t, 4>& counter,
+                                           const std::array<std::uint32_t, 2>& key);
+
+}  // namespace colony

@@ -1,0 +1,69 @@
+#include "engine/space/overlap_kernel.hpp"
+
+#include "engine/base/maths.hpp"
+
+namespace colony::kernel {
+namespace {
+
+// sin x for |x| <= 100: reduced by multiples of pi in two steps, odd Taylor polynomial to degree 11 on [-pi/2, pi/2].
+// Absolute error below 1e-6 (tests/unit/space_test.cpp). Branch-free, so that a loop over points vectorises.
+inline float sine(float x) {
+  const float turns = x * 0.318309886F;
+  const auto k = static_cast<std::int32_t>(turns + (turns < 0.0F ? -0.5F : 0.5F));
+  const auto kf = static_cast<float>(k);
+  const float r = (x - kf * 3.140625F) - kf * 9.67653589793e-4F;
+  const float r2 = r * r;
+  float sum = -2.50521084e-8F;
+  sum = sum * r2 + 2.75573192e-6F;
+  sum = sum * r2 - 1.98412698e-4F;
+  sum = sum * r2 + 8.33333333e-3F;
+  sum = sum * r2 - 1.66666667e-1F;
+  const float s = r + r * r2 * sum;
+  return static_cast<float>(1 - 2 * (k & 1)) * s;
+}
+
+float reduced_phase(double phase) {
+  const double turns = phase / (2.0 * maths::kPi);
+  return static_cast<float>(phase - 2.0 * maths::kPi * static_cast<double>(static_cast<std::int64_t>(turns)));
+}
+
+}  // namespace
+
+FloatBody::FloatBody(const Body& body, const Vec3& origin_um) {
+  const Vec3 shift = body.to_unit() * (origin_um - body.centre_um());
+  const NoiseParams& p = body.noise();
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) m[3 * i + j] = static_cast<float>(body.to_unit()(i, j));
+    t[i] = static_cast<float>(shift[i]);
+    q1[i] = reduced_phase(p.frequency * body.noise_offset()[i]);
+    q2[i] = reduced_phase(p.frequency / 1.35 * body.noise_offset()[i]);
+  }
+  frequency = static_cast<float>(p.frequency);
+  slower_frequency = static_cast<float>(p.frequency / 1.35);
+  amplitude = static_cast<float>(p.amplitude);
+  second_amplitude = static_cast<float>(p.amplitude / 1.17);
+  phase = static_cast<float>(p.phase);
+  // A little wider than the bound: rounding in the noise must not make the shortcut differ from the full evaluation.
+  band = static_cast<float>(body.noise_bound()) * 1.0001F + 1e-5F;
+}
+
+void noise(const FloatBody& b, const float* u, const float* v, const float* w, std::size_t n, float* out) {
+  for (std::size_t i = 0; i < n; ++i) {
+    const float sx = sine(b.frequency * u[i] + b.q1[0]);
+    const float sy = sine(b.frequency * v[i] + b.q1[1]);
+    const float sz = sine(b.frequency * w[i] + b.q1[2]);
+    const float gx = b.amplitude * sx + b.second_amplitude * sine(b.slower_frequency * u[i] + b.q2[0] + b.phase * sz);
+    const float gy = b.amplitude * sy + b.second_amplitude * sine(b.slower_frequency * v[i] + b.q2[1] + b.phase * sx);
+    const float gz = b.amplitude * sz + b.second_amplitude * sine(b.slower_frequency * w[i] + b.q2[2] + b.phase * sy);
+    out[i] = gx * gy * gz;
+  }
+}
+
+void smooth_field(const FloatBody& b, const float* x, const float* y, const float* z, std::size_t n, float* out) {
+  for (std::size_t i = 0; i < n; ++i) {
+    const Unit p = to_unit(b, x[i], y[i], z[i]);
+    out[i] = 1.0F - p.u * p.u - p.v * p.v - p.w * p.w;
+  }
+}
+
+}  // namespace colony::kernel
