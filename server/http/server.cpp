@@ -28,21 +28,54 @@ constexpr int kRefusedLingeringMax = 64;
 constexpr std::chrono::milliseconds kRefusedLinger{500};
 constexpr std::chrono::milliseconds kAcceptPause{100};
 
-Error listen_error(std::string message) {
-  Error error{ErrorCode::kInvalid, "server.listen: " + message};
-  error.fields.push_back({"server.listen", std::move(message)});
+Error config_error(std::string field, std::string message) {
+  Error error{ErrorCode::kInvalid, field + ": " + message};
+  error.fields.push_back({std::move(field), std::move(message)});
   return error;
+}
+
+/// What would make a server that never answers, or a rule that never matches.
+Status check_config(const ServerConfig& config) {
+  const std::pair<const char*, std::size_t> counts[] = {
+      {"io_threads", config.io_threads},
+      {"worker_threads", config.worker_threads},
+      {"connections_max", config.connections_max},
+      {"requests_waiting_max", config.requests_waiting_max},
+      {"header_bytes_max", config.header_bytes_max},
+      {"header_fields_max", config.header_fields_max},
+      {"target_bytes_max", config.target_bytes_max},
+      {"header_timeout_ms", config.header_timeout_ms > 0},
+      {"body_timeout_ms", config.body_timeout_ms > 0},
+      {"idle_timeout_ms", config.idle_timeout_ms > 0},
+      {"write_timeout_ms", config.write_timeout_ms > 0},
+      {"stream_keep_alive_ms", config.stream_keep_alive_ms > 0},
+  };
+  for (const auto& [name, value] : counts) {
+    if (value == 0) return config_error(std::string("server.") + name, "must be greater than 0");
+  }
+  for (const auto& host : config.allowed_hosts) {
+    const auto authority = parse_authority(host);
+    if (!authority || authority->port) return config_error("server.allowed_hosts", "'" + host + "' is not a host without port");
+  }
+  const std::string& base = config.base_path;
+  if (!base.empty() && (base.front() != '/' || base.back() == '/')) {
+    return config_error("server.base_path", "must begin with '/' and not end with one");
+  }
+  return Ok{};
 }
 
 std::string to_text(const tcp::endpoint& endpoint) {
   return endpoint.address().to_string() + ":" + std::to_string(endpoint.port());
 }
 
+Error listen_error(std::string message) { return config_error("server.listen", std::move(message)); }
+
 // A connection beyond the limit: it gets its answer unread, without a session. It is kept for a moment, as a close with unread
 // bytes would take the answer away again.
 class RefusedConnection : public std::enable_shared_from_this<RefusedConnection> {
  public:
-  RefusedConnection(tcp::socket socket, std::atomic<int>& count) : socket_(std::move(socket)), timer_(socket_.get_executor()), count_(count) {
+  RefusedConnection(tcp::socket socket, std::atomic<int>& count)
+      : socket_(std::move(socket)), timer_(socket_.get_executor()), count_(count) {
     ++count_;
   }
   ~RefusedConnection() { --count_; }
@@ -234,6 +267,7 @@ class BeastServer final : public Server {
 
 Result<std::unique_ptr<Server>> Server::create(ServerConfig config, const Router& router,
                                                std::function<void(const AccessRecord&)> log) {
+  if (const auto status = check_config(config); !status) return status.error();
   auto server = std::make_unique<BeastServer>(std::move(config), router, std::move(log));
   const auto status = server->listen();
   if (!status) return status.error();

@@ -77,7 +77,7 @@ class Session : public std::enable_shared_from_this<Session> {
   bool fill_request();
   WorkerPool::Task as_worker_task(std::function<void()> work);
   void prepare_response();
-  void pull_stream();
+  void pull_stream(bool is_first);
   void let_go_of_stream();
   void write_log() const;
   void on_strand(std::function<void()> task);

@@ -43,10 +43,11 @@ class Session::Waker {
 };
 
 // On a worker. What the source throws ends the connection without the last chunk, so that the client sees a truncated body.
-void Session::pull_stream() {
+void Session::pull_stream(bool is_first) {
   pulled_.reset();
   std::string what = "a stream threw what is not a std::exception";
   try {
+    if (is_first) response_.stream->on_ready([waker = waker_] { waker->wake(); });
     pulled_ = response_.stream->pull(piece_);
     return;
   } catch (const std::exception& error) {
@@ -63,11 +64,7 @@ Awaitable<bool> Session::send_stream(Framing framing) {
     // Before the pull: a wake that comes while it runs must lead to another one.
     woken_ = false;
     piece_.clear();
-    std::function<void()> pull = [this, is_first] {
-      if (is_first) response_.stream->on_ready([waker = waker_] { waker->wake(); });
-      pull_stream();
-    };
-    auto task = as_worker_task(std::move(pull));
+    auto task = as_worker_task([this, is_first] { pull_stream(is_first); });
     shared_.workers.submit_pull(std::move(task));
     co_await wait_for_worker();
     is_first = false;
