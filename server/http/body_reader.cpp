@@ -21,6 +21,14 @@ constexpr std::size_t kExtensionBytesTotalMax = 4096;  // of all chunks of a bod
 // What Beast cannot use yet stays in the input: a chunk's first line, or the trailer fields.
 constexpr std::size_t kUnreadBytesMax = 8 * 1024;
 
+// In what Beast leaves, every line still has its CRLF. It would wait for ever for the CR of a line that has none.
+bool holds_bare_lf(std::string_view unread) {
+  for (std::size_t at = unread.find('\n'); at != std::string_view::npos; at = unread.find('\n', at + 1)) {
+    if (at == 0 || unread[at - 1] != '\r') return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 struct BodyReader::Chunks {
@@ -38,7 +46,8 @@ BodyReader::BodyReader(const RequestHead& head, std::size_t body_bytes_max) : bo
   chunks_ = std::make_unique<Chunks>();
   chunks_->parser.body_limit(body_bytes_max);
   chunks_->parser.eager(true);
-  chunks_->on_header = [chunks = chunks_.get()](std::uint64_t, beast::string_view extensions, beast::error_code& error) {
+  chunks_->on_header = [chunks = chunks_.get()](std::uint64_t, beast::string_view extensions,
+                                                beast::error_code& error) {
     chunks->extension_bytes += extensions.size();
     if (extensions.size() > kExtensionBytesMax || chunks->extension_bytes > kExtensionBytesTotalMax) {
       error = beast::http::error::bad_chunk_extension;
@@ -82,7 +91,11 @@ BodyReader::State BodyReader::feed_chunks(std::string& input) {
                    "the body may have at most " + std::to_string(body_bytes_max_) + " bytes"});
   }
   if (error && error != beast::http::error::need_more) {
-    return refuse({400, "bad-request", "The request is malformed", "the chunked body is malformed: " + error.message()});
+    return refuse(
+        {400, "bad-request", "The request is malformed", "the chunked body is malformed: " + error.message()});
+  }
+  if (holds_bare_lf(input)) {
+    return refuse({400, "bad-request", "The request is malformed", "the chunked body is malformed: an LF without CR"});
   }
   if (input.size() > kUnreadBytesMax) {
     return refuse({400, "bad-request", "The request is malformed", "a chunk extension or the trailer is too long"});

@@ -13,7 +13,9 @@ constexpr std::string_view kMethods[] = {"GET", "HEAD", "POST", "PUT", "PATCH", 
 
 Refusal bad_request(std::string detail) { return {400, "bad-request", "The request is malformed", std::move(detail)}; }
 
-Refusal header_too_large(std::string detail) { return {431, "header-too-large", "The header is too large", std::move(detail)}; }
+Refusal header_too_large(std::string detail) {
+  return {431, "header-too-large", "The header is too large", std::move(detail)};
+}
 
 Refusal target_too_long(std::size_t limit) {
   return {414, "target-too-long", "The request target is too long",
@@ -27,7 +29,8 @@ Check read_version(std::string_view version, RequestHead& head) {
                           version[6] == '.' && is_digit(version[7]);
   if (!is_version) return bad_request("the request line must end in HTTP/1.1 or HTTP/1.0");
   if (version[5] != '1' || version[7] > '1') {
-    return Refusal{505, "version-not-supported", "The HTTP version is not supported", "this server speaks HTTP/1.1 and HTTP/1.0"};
+    return Refusal{505, "version-not-supported", "The HTTP version is not supported",
+                   "this server speaks HTTP/1.1 and HTTP/1.0"};
   }
   head.version_minor = version[7] - '0';
   return std::nullopt;
@@ -37,7 +40,8 @@ Check read_version(std::string_view version, RequestHead& head) {
 Check read_request_line(std::string_view line, RequestHead& head, std::string_view& target) {
   const auto first = line.find(' ');
   const auto last = line.rfind(' ');
-  if (first == std::string_view::npos || first == last) return bad_request("the request line needs a method, a target and a version");
+  if (first == std::string_view::npos || first == last)
+    return bad_request("the request line needs a method, a target and a version");
   const auto method = line.substr(0, first);
   target = line.substr(first + 1, last - first - 1);
   if (!is_token(method)) return bad_request("the method is not a token");
@@ -53,7 +57,8 @@ Check read_field(std::string_view line, const GatePolicy& policy, RequestHead& h
   const auto colon = line.find(':');
   if (colon == std::string_view::npos) return bad_request("a header line has no colon");
   const auto name = line.substr(0, colon);
-  if (!is_token(name)) return bad_request("a header field name is empty or holds a character that is not allowed, such as a blank");
+  if (!is_token(name))
+    return bad_request("a header field name is empty or holds a character that is not allowed, such as a blank");
   if (head.headers.all().size() >= policy.header_fields_max) {
     return header_too_large("the header may have at most " + std::to_string(policy.header_fields_max) + " fields");
   }
@@ -81,8 +86,10 @@ Check read_framing(RequestHead& head) {
     head.chunked = true;
   }
   if (length) {
-    if (length->empty() || length->size() > kContentLengthDigitsMax || !std::all_of(length->begin(), length->end(), is_digit)) {
-      return bad_request("Content-Length must be one decimal number of at most " + std::to_string(kContentLengthDigitsMax) + " digits");
+    if (length->empty() || length->size() > kContentLengthDigitsMax ||
+        !std::all_of(length->begin(), length->end(), is_digit)) {
+      return bad_request("Content-Length must be one decimal number of at most " +
+                         std::to_string(kContentLengthDigitsMax) + " digits");
     }
     std::uint64_t value = 0;
     for (const char c : *length) value = value * 10 + static_cast<std::uint64_t>(c - '0');
@@ -103,11 +110,13 @@ void read_connection(RequestHead& head) {
 }
 
 bool is_allowed(const Authority& authority, const GatePolicy& policy) {
-  return std::find(policy.allowed_hosts.begin(), policy.allowed_hosts.end(), authority.host) != policy.allowed_hosts.end();
+  return std::find(policy.allowed_hosts.begin(), policy.allowed_hosts.end(), authority.host) !=
+         policy.allowed_hosts.end();
 }
 
-// A page may call us only if it was served by us: its origin is the very authority this request went to (which may be the
-// near end of a tunnel, with another port), or one of our hosts with our own port. Another server on this machine is foreign.
+// A page may call us only if it was served by us: its origin is the very authority this request went to (which may be
+// the near end of a tunnel, with another port), or one of our hosts with our own port. Another server on this machine
+// is foreign.
 bool is_own_origin(std::string_view origin, const Authority& host, const GatePolicy& policy) {
   std::uint16_t default_port = 80;
   if (origin.substr(0, 7) == "http://") {
@@ -135,13 +144,15 @@ Check read_addressee(std::string_view target, const GatePolicy& policy, RequestH
   if (!parsed) return bad_request(parsed.error().message);
   head.target = std::move(*parsed);
   if (head.target.authority) {
-    if (!is_allowed(*head.target.authority, policy)) return bad_request("the request target names a host that is not served here");
+    if (!is_allowed(*head.target.authority, policy))
+      return bad_request("the request target names a host that is not served here");
     if (*head.target.authority != *host) return bad_request("the request target and Host name different hosts");
   }
 
   if (!is_allowed(*host, policy)) {
-    return Refusal{421, "misdirected-request", "The request was sent to the wrong server",
-                   "Host names a host that is not served here; allowed_hosts of the configuration lists those that are"};
+    return Refusal{
+        421, "misdirected-request", "The request was sent to the wrong server",
+        "Host names a host that is not served here; allowed_hosts of the configuration lists those that are"};
   }
   for (const auto& [name, value] : head.headers.all()) {
     if (equals_without_case(name, "Origin") && !is_own_origin(value, *host, policy)) {
@@ -160,7 +171,8 @@ Check read_expectation(const GatePolicy& policy, RequestHead& head) {
   for (const auto& [name, value] : head.headers.all()) {
     if (!equals_without_case(name, "Expect") || head.version_minor == 0) continue;  // HTTP/1.0 knows no Expect
     if (!equals_without_case(value, "100-continue")) {
-      return Refusal{417, "expectation-failed", "The expectation cannot be met", "the only Expect accepted is 100-continue"};
+      return Refusal{417, "expectation-failed", "The expectation cannot be met",
+                     "the only Expect accepted is 100-continue"};
     }
     head.expects_continue = head.chunked || head.content_length.value_or(0) > 0;
   }

@@ -24,9 +24,10 @@ std::vector<std::string> split(std::string_view path) {
 }
 
 bool matches(const std::vector<std::string>& pattern, const std::vector<std::string>& path) {
-  return std::equal(pattern.begin(), pattern.end(), path.begin(), path.end(), [](const auto& expected, const auto& segment) {
-    return expected == kCapture ? !segment.empty() : expected == segment;
-  });
+  return std::equal(pattern.begin(), pattern.end(), path.begin(), path.end(),
+                    [](const auto& expected, const auto& segment) {
+                      return expected == kCapture ? !segment.empty() : expected == segment;
+                    });
 }
 
 /// Of two patterns that match the same path: the one whose first difference is a literal.
@@ -59,7 +60,8 @@ void append_json_string(std::string& out, std::string_view text) {
 
 }  // namespace
 
-Response problem(int status, std::string_view code, std::string_view title, std::string_view detail, std::string_view request_id) {
+Response problem(int status, std::string_view code, std::string_view title, std::string_view detail,
+                 std::string_view request_id) {
   Response response;
   response.status = status;
   response.headers.set("Content-Type", "application/problem+json");
@@ -92,10 +94,12 @@ Response Router::dispatch(Request& request) const {
   // The pattern is chosen before the method: DELETE /v1/jobs/counts must not fall through to the job named "counts".
   const std::vector<std::string>* pattern = nullptr;
   for (const auto& route : routes_) {
-    if (matches(route.segments, path) && (!pattern || is_more_specific(route.segments, *pattern))) pattern = &route.segments;
+    if (matches(route.segments, path) && (!pattern || is_more_specific(route.segments, *pattern)))
+      pattern = &route.segments;
   }
   if (!pattern) {
-    return problem(404, "not-found", "There is nothing here", "no resource has the path " + request.path, request.request_id);
+    return problem(404, "not-found", "There is nothing here", "no resource has the path " + request.path,
+                   request.request_id);
   }
 
   const Route* chosen = nullptr;

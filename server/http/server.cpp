@@ -23,7 +23,7 @@ using asio::ip::tcp;
 using boost::system::error_code;
 namespace {
 
-constexpr int kConnectionsInBacklogMax = 512;      // not yet accepted; the kernel holds them
+constexpr int kConnectionsInBacklogMax = 512;  // not yet accepted; the kernel holds them
 constexpr int kRefusedLingeringMax = 64;
 constexpr std::chrono::milliseconds kRefusedLinger{500};
 constexpr std::chrono::milliseconds kAcceptPause{100};
@@ -55,7 +55,8 @@ Status check_config(const ServerConfig& config) {
   }
   for (const auto& host : config.allowed_hosts) {
     const auto authority = parse_authority(host);
-    if (!authority || authority->port) return config_error("server.allowed_hosts", "'" + host + "' is not a host without port");
+    if (!authority || authority->port)
+      return config_error("server.allowed_hosts", "'" + host + "' is not a host without port");
   }
   const std::string& base = config.base_path;
   if (!base.empty() && (base.front() != '/' || base.back() == '/')) {
@@ -70,8 +71,8 @@ std::string to_text(const tcp::endpoint& endpoint) {
 
 Error listen_error(std::string message) { return config_error("server.listen", std::move(message)); }
 
-// A connection beyond the limit: it gets its answer unread, without a session. It is kept for a moment, as a close with unread
-// bytes would take the answer away again.
+// A connection beyond the limit: it gets its answer unread, without a session. It is kept for a moment, as a close with
+// unread bytes would take the answer away again.
 class RefusedConnection : public std::enable_shared_from_this<RefusedConnection> {
  public:
   RefusedConnection(tcp::socket socket, std::atomic<int>& count)
@@ -111,7 +112,8 @@ class BeastServer final : public Server {
   BeastServer(ServerConfig config, const Router& router, std::function<void(const AccessRecord&)> log)
       : config_(std::move(config)),
         workers_(config_.worker_threads, config_.requests_waiting_max),
-        shared_{config_, policy_, router, workers_, request_ids_, std::move(log), [this](std::uint64_t id) { on_end(id); }},
+        shared_{
+            config_, policy_, router, workers_, request_ids_, std::move(log), [this](std::uint64_t id) { on_end(id); }},
         acceptor_(asio::make_strand(io_)),
         pause_(acceptor_.get_executor()),
         work_(asio::make_work_guard(io_)) {}
@@ -123,7 +125,8 @@ class BeastServer final : public Server {
     const auto address = asio::ip::make_address(config_.address, error);
     if (error) return listen_error("'" + config_.address + "' is not an IP address");
     if (!address.is_loopback()) {
-      return listen_error("'" + config_.address + "' is not a loopback address (127.0.0.0/8 or ::1); this version has no tokens and "
+      return listen_error("'" + config_.address +
+                          "' is not a loopback address (127.0.0.0/8 or ::1); this version has no tokens and "
                           "no TLS, so it serves this machine only");
     }
     const tcp::endpoint endpoint(address, config_.port);
@@ -219,7 +222,8 @@ class BeastServer final : public Server {
 
   void refuse(tcp::socket socket) {
     const std::string id = request_ids_.next();
-    Response response = problem(503, "too-many-connections", "The server has too many connections", "try again in a second", id);
+    Response response =
+        problem(503, "too-many-connections", "The server has too many connections", "try again in a second", id);
     response.headers.set("Retry-After", "1");
     WireOptions options;
     options.keep_alive = false;
@@ -241,26 +245,26 @@ class BeastServer final : public Server {
     ended_.notify_all();
   }
 
-  const ServerConfig config_;                  // fixed after construction, as is all down to shared_ (policy_: after listen)
+  const ServerConfig config_;  // fixed after construction, as is all down to shared_ (policy_: after listen)
   GatePolicy policy_;
   std::atomic<int> refused_count_{0};
-  RequestIds request_ids_;                     // synchronises itself, as the two below
+  RequestIds request_ids_;  // synchronises itself, as the two below
   asio::io_context io_;
   WorkerPool workers_;
   SessionShared shared_;
 
-  tcp::acceptor acceptor_;                     // on its own strand, with pause_
+  tcp::acceptor acceptor_;  // on its own strand, with pause_
   asio::steady_timer pause_;
   asio::executor_work_guard<asio::io_context::executor_type> work_;
-  std::vector<std::thread> threads_;           // run and stop
+  std::vector<std::thread> threads_;  // run and stop
 
-  std::mutex stop_mutex_;                      // guards stopped_
+  std::mutex stop_mutex_;  // guards stopped_
   bool stopped_ = false;
-  std::mutex mutex_;                           // guards everything below
+  std::mutex mutex_;  // guards everything below
   std::condition_variable ended_;
   bool draining_ = false;
   std::uint64_t session_count_ = 0;
-  std::map<std::uint64_t, std::shared_ptr<Session>> sessions_;   // at most config_.connections_max
+  std::map<std::uint64_t, std::shared_ptr<Session>> sessions_;  // at most config_.connections_max
 };
 
 }  // namespace

@@ -54,7 +54,10 @@ std::string RequestIds::next() {
 }
 
 Session::Session(asio::ip::tcp::socket socket, SessionShared& shared, std::uint64_t id, std::string remote)
-    : connection_(std::make_shared<Connection>(std::move(socket))), shared_(shared), id_(id), remote_(std::move(remote)) {}
+    : connection_(std::make_shared<Connection>(std::move(socket))),
+      shared_(shared),
+      id_(id),
+      remote_(std::move(remote)) {}
 
 void Session::start() { asio::co_spawn(connection_->executor(), run(shared_from_this()), asio::detached); }
 
@@ -149,9 +152,9 @@ Awaitable<bool> Session::read_head() {
   co_return true;
 }
 
-// Here tokens will be checked: after the gate, so that only well-formed requests are looked at, and before the body is read, so
-// that a stranger cannot make the server hold one. In this version only loopback addresses are bound and every local user is
-// admitted.
+// Here tokens will be checked: after the gate, so that only well-formed requests are looked at, and before the body is
+// read, so that a stranger cannot make the server hold one. In this version only loopback addresses are bound and every
+// local user is admitted.
 std::optional<Refusal> Session::admit() const { return std::nullopt; }
 
 Awaitable<bool> Session::read_body() {
@@ -189,7 +192,8 @@ bool Session::fill_request() {
   const bool is_inside = request_.path.compare(0, base.size(), base) == 0 &&
                          (request_.path.size() == base.size() || request_.path[base.size()] == '/');
   if (!is_inside) {
-    response_ = problem(404, "not-found", "There is nothing here", "no resource has the path " + request_.path, request_.request_id);
+    response_ = problem(404, "not-found", "There is nothing here", "no resource has the path " + request_.path,
+                        request_.request_id);
     return false;
   }
   request_.path.erase(0, base.size());
@@ -219,7 +223,8 @@ Awaitable<void> Session::handle() {
   if (is_queued) {
     co_await wait_for_worker();
   } else {
-    refusal_ = Refusal{503, "overloaded", "The server is busy", "too many requests wait already; try again in a second"};
+    refusal_ =
+        Refusal{503, "overloaded", "The server is busy", "too many requests wait already; try again in a second"};
   }
 }
 

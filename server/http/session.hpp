@@ -1,9 +1,10 @@
 // session: the requests of one connection, one after the other: gate, admission, body, router, answer.
 // Promises that nothing of a handler or a stream runs on an I/O thread; that every request is answered in order, or the
-//          connection is closed; that a stream holds a worker only while it is pulled, and is never pulled while its last piece
-//          is still being sent; and that it ends soon after close().
+//          connection is closed; that a stream holds a worker only while it is pulled, and is never pulled while its
+//          last piece is still being sent; and that it ends soon after close().
 // Does not keep a connection after a refusal: where the next request begins is then a matter of trust.
-// Threads: start, drain and close from any thread; everything else on the connection's strand, but for the tasks of workers,
+// Threads: start, drain and close from any thread; everything else on the connection's strand, but for the tasks of
+// workers,
 //          which touch request_, response_ and piece_ while the session waits for them.
 #pragma once
 
@@ -44,7 +45,7 @@ struct SessionShared {
   const Router& router;
   WorkerPool& workers;
   RequestIds& request_ids;
-  std::function<void(const AccessRecord&)> log;      // may be empty
+  std::function<void(const AccessRecord&)> log;  // may be empty
   std::function<void(std::uint64_t session_id)> on_end;
 };
 
@@ -62,8 +63,8 @@ class Session : public std::enable_shared_from_this<Session> {
   class Waker;
 
   static Awaitable<void> run(std::shared_ptr<Session> self);
-  Awaitable<bool> serve_one();                       // false: the connection is over
-  Awaitable<bool> read_head();                       // false: nothing is left to answer, here and below
+  Awaitable<bool> serve_one();  // false: the connection is over
+  Awaitable<bool> read_head();  // false: nothing is left to answer, here and below
   Awaitable<bool> read_body();
   Awaitable<void> handle();
   Awaitable<bool> answer();
@@ -86,7 +87,7 @@ class Session : public std::enable_shared_from_this<Session> {
   SessionShared& shared_;
   const std::uint64_t id_;
   const std::string remote_;
-  std::atomic<bool> closing_{false};                 // read by workers, to skip what nobody waits for
+  std::atomic<bool> closing_{false};  // read by workers, to skip what nobody waits for
   bool draining_ = false;
   Phase phase_ = Phase::kReadingHead;
   bool served_before_ = false;
@@ -98,13 +99,13 @@ class Session : public std::enable_shared_from_this<Session> {
   Request request_;
   Response response_;
   bool keep_alive_ = false;
-  std::uint64_t sent_bytes_ = 0;                     // of the body
+  std::uint64_t sent_bytes_ = 0;  // of the body
 
   bool worker_is_done_ = false;
   std::shared_ptr<Waker> waker_;
   bool woken_ = false;
   std::string piece_;
-  std::optional<BodySource::Pull> pulled_;           // empty: the pull threw
+  std::optional<BodySource::Pull> pulled_;  // empty: the pull threw
 };
 
 }  // namespace colony::server::http

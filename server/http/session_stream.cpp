@@ -8,8 +8,8 @@ namespace colony::server::http {
 
 using Io = Connection::Io;
 
-// Stands between a source, which may wake whenever it likes and from any thread, and a session that may have ended. Calls that
-// come before the session has looked are one call.
+// Stands between a source, which may wake whenever it likes and from any thread, and a session that may have ended.
+// Calls that come before the session has looked are one call.
 class Session::Waker {
  public:
   explicit Waker(Session* session) : session_(session) {}
@@ -37,12 +37,13 @@ class Session::Waker {
     is_pending_ = false;
   }
 
-  std::mutex mutex_;                           // guards everything below
-  Session* session_;                           // null: detached
+  std::mutex mutex_;  // guards everything below
+  Session* session_;  // null: detached
   bool is_pending_ = false;
 };
 
-// On a worker. What the source throws ends the connection without the last chunk, so that the client sees a truncated body.
+// On a worker. What the source throws ends the connection without the last chunk, so that the client sees a truncated
+// body.
 void Session::pull_stream(bool is_first) {
   pulled_.reset();
   std::string what = "a stream threw what is not a std::exception";
@@ -77,7 +78,8 @@ Awaitable<bool> Session::send_stream(Framing framing) {
     bool is_sent = co_await send_piece(framing, piece_);
     if (!is_sent) co_return false;
     if (*pulled_ == BodySource::Pull::kEnd) break;
-    // A stream with a farewell can be taken up again elsewhere; one without is finished, as long as the server waits for it.
+    // A stream with a farewell can be taken up again elsewhere; one without is finished, as long as the server waits
+    // for it.
     const std::string_view farewell = response_.stream->farewell();
     if (*pulled_ == BodySource::Pull::kWait) {
       co_await wait_for_stream(farewell);
@@ -123,7 +125,8 @@ void Session::let_go_of_stream() {
   if (waker_) waker_->detach();
   waker_.reset();
   if (!response_.stream) return;
-  shared_.workers.submit_pull([stream = std::shared_ptr<BodySource>(std::move(response_.stream))]() mutable { stream.reset(); });
+  shared_.workers.submit_pull(
+      [stream = std::shared_ptr<BodySource>(std::move(response_.stream))]() mutable { stream.reset(); });
 }
 
 }  // namespace colony::server::http

@@ -13,8 +13,11 @@ bool is_path_char(char c) {
   return is_alpha(c) || is_digit(c) || std::string_view("-._~!$&'()*+,;=:@/%").find(c) != std::string_view::npos;
 }
 
-// Wider than RFC 3986: browsers leave these brackets and bars unescaped in a query, and nothing here gives them a meaning.
-bool is_query_char(char c) { return is_path_char(c) || std::string_view("?[]{}|^`\\").find(c) != std::string_view::npos; }
+// Wider than RFC 3986: browsers leave these brackets and bars unescaped in a query, and nothing here gives them a
+// meaning.
+bool is_query_char(char c) {
+  return is_path_char(c) || std::string_view("?[]{}|^`\\").find(c) != std::string_view::npos;
+}
 
 bool has_dot_segment(std::string_view path) {
   while (!path.empty()) {
@@ -32,7 +35,8 @@ Result<std::string> decode_path(std::string_view text) {
   }
   auto path = percent_decode(text, false);
   if (!path) return malformed("the path holds an invalid percent escape");
-  if (std::any_of(path->begin(), path->end(), is_control)) return malformed("the path holds an escaped control character");
+  if (std::any_of(path->begin(), path->end(), is_control))
+    return malformed("the path holds an escaped control character");
   if (std::count(path->begin(), path->end(), '/') != std::count(text.begin(), text.end(), '/')) {
     return malformed("the path holds an escaped '/'");
   }
@@ -63,13 +67,15 @@ Result<Ok> decode_query(std::string_view text, std::vector<std::pair<std::string
 }
 
 bool is_host_name(std::string_view host) {
-  return !host.empty() && std::all_of(host.begin(), host.end(),
-                                      [](char c) { return is_alpha(c) || is_digit(c) || c == '.' || c == '-' || c == '_'; });
+  return !host.empty() && std::all_of(host.begin(), host.end(), [](char c) {
+    return is_alpha(c) || is_digit(c) || c == '.' || c == '-' || c == '_';
+  });
 }
 
 bool is_ipv6_literal(std::string_view host) {
   return host.size() > 4 && host.front() == '[' && host.back() == ']' &&
-         std::all_of(host.begin() + 1, host.end() - 1, [](char c) { return hex_value(c) >= 0 || c == ':' || c == '.'; });
+         std::all_of(host.begin() + 1, host.end() - 1,
+                     [](char c) { return hex_value(c) >= 0 || c == ':' || c == '.'; });
 }
 
 }  // namespace
@@ -103,7 +109,8 @@ std::optional<Authority> parse_authority(std::string_view text) {
   if (!is_host_name(host) && !is_ipv6_literal(host)) return std::nullopt;
   if (colon != std::string_view::npos) {
     const auto digits = text.substr(colon + 1);
-    if (digits.empty() || digits.size() > 5 || !std::all_of(digits.begin(), digits.end(), is_digit)) return std::nullopt;
+    if (digits.empty() || digits.size() > 5 || !std::all_of(digits.begin(), digits.end(), is_digit))
+      return std::nullopt;
     unsigned port = 0;
     for (const char c : digits) port = port * 10 + static_cast<unsigned>(c - '0');
     if (port > 65535) return std::nullopt;

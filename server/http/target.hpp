@@ -1,6 +1,8 @@
 // target: the request target and the authorities of Host and Origin, taken apart strictly.
-// Promises that a decoded path starts with '/', is UTF-8, and has no dot segment, no control character and no '/' that was
-//          escaped: a path that passed means the same to every reader after the gate. A decoded query is UTF-8 without NUL.
+// Promises that a decoded path starts with '/', is UTF-8, and has no dot segment, no control character and no '/' that
+// was
+//          escaped: a path that passed means the same to every reader after the gate. A decoded query is UTF-8 without
+//          NUL.
 // Does not resolve anything: "." and ".." are refused, never folded; "//" stays two slashes (and finds no route).
 // Errors:  a sentence for the client. Threads: pure.
 #pragma once
@@ -17,8 +19,8 @@
 namespace colony::server::http {
 
 struct Authority {
-  std::string host;                        // lower case; an IPv6 address with its brackets
-  std::optional<std::uint16_t> port;       // absent: not written
+  std::string host;                   // lower case; an IPv6 address with its brackets
+  std::optional<std::uint16_t> port;  // absent: not written
   friend bool operator==(const Authority&, const Authority&) = default;
 };
 
@@ -26,7 +28,7 @@ struct Authority {
 std::optional<Authority> parse_authority(std::string_view text);
 
 struct Target {
-  std::optional<Authority> authority;      // of the absolute form
+  std::optional<Authority> authority;  // of the absolute form
   std::string path;
   std::vector<std::pair<std::string, std::string>> query;
 };

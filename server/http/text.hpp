@@ -20,7 +20,8 @@ constexpr int hex_value(char c) {
 
 /// tchar of RFC 9110, 5.6.2: what field names and methods are made of.
 constexpr bool is_token_char(char c) {
-  return is_digit(c) || is_alpha(c) || (c != '\0' && std::string_view("!#$%&'*+-.^_`|~").find(c) != std::string_view::npos);
+  return is_digit(c) || is_alpha(c) ||
+         (c != '\0' && std::string_view("!#$%&'*+-.^_`|~").find(c) != std::string_view::npos);
 }
 
 bool equals_without_case(std::string_view a, std::string_view b);
@@ -30,8 +31,8 @@ std::string_view trim_blanks(std::string_view text);  // spaces and tabs at both
 /// Whether a comma separated list (Connection, for one) holds `token`, compared without case.
 bool list_holds(std::string_view list, std::string_view token);
 
-/// Length of the well-formed UTF-8 character that `text` begins with; 0 if there is none. Surrogates and overlong forms are not
-/// well-formed.
+/// Length of the well-formed UTF-8 character that `text` begins with; 0 if there is none. Surrogates and overlong forms
+/// are not well-formed.
 std::size_t utf8_length(std::string_view text);
 bool is_utf8(std::string_view text);
 

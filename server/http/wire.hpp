@@ -19,7 +19,7 @@ enum class Framing { kLength, kChunked, kUntilClose };
 struct WireOptions {
   Framing framing = Framing::kLength;
   bool keep_alive = true;
-  int version_minor = 1;                       // of the request: a kept HTTP/1.0 connection must be told so
+  int version_minor = 1;  // of the request: a kept HTTP/1.0 connection must be told so
   std::string_view request_id;
 };
 

@@ -16,10 +16,10 @@ namespace colony::server::http {
 
 class WorkerPool {
  public:
-  using Task = std::function<void()>;          // must not throw
+  using Task = std::function<void()>;  // must not throw
 
   WorkerPool(std::size_t thread_count, std::size_t requests_waiting_max);
-  ~WorkerPool();                               // as stop()
+  ~WorkerPool();  // as stop()
 
   void start();
   /// False: the queue is full (or the pool has stopped), the task will not run.
@@ -33,10 +33,10 @@ class WorkerPool {
 
   const std::size_t thread_count_;
   const std::size_t requests_waiting_max_;
-  std::vector<std::thread> threads_;           // touched by start and stop only
-  std::mutex mutex_;                           // guards everything below
+  std::vector<std::thread> threads_;  // touched by start and stop only
+  std::mutex mutex_;                  // guards everything below
   std::condition_variable changed_;
-  std::deque<Task> requests_;                  // at most requests_waiting_max_
+  std::deque<Task> requests_;  // at most requests_waiting_max_
   std::deque<Task> pulls_;
   bool pull_is_next_ = false;
   bool stopping_ = false;

@@ -12,10 +12,6 @@
 namespace colony::server::http {
 namespace {
 
-std::string get(const std::string& path, const char* version = "1.1") {
-  return "GET " + path + " HTTP/" + version + "\r\nHost: localhost\r\n\r\n";
-}
-
 /// What a test knows of the sources that a server holds.
 class Watch {
  public:
@@ -85,7 +81,8 @@ Source::Pulls pieces(std::vector<std::string> all) {
   };
 }
 
-Handler source_route(Watch& watch, std::function<Source::Pulls()> make, std::string farewell = "", std::string keep_alive = "") {
+Handler source_route(Watch& watch, std::function<Source::Pulls()> make, std::string farewell = "",
+                     std::string keep_alive = "") {
   return [&watch, make = std::move(make), farewell, keep_alive](const Request&) {
     return streamed(std::make_unique<Source>(watch, make(), farewell, keep_alive));
   };
@@ -101,7 +98,9 @@ Source::Pulls waits_for_ever() {
 TEST(HttpStream, PiecesBecomeChunksAndTheConnectionStays) {
   Watch watch;
   TestServer server([&watch](Router& router) {
-    router.add("GET", "/s", source_route(watch, [] { return pieces({"one,", "", std::string(70'000, 'x'), "", "end"}); }));
+    router.add("GET", "/s", source_route(watch, [] {
+                 return pieces({"one,", "", std::string(70'000, 'x'), "", "end"});
+               }));
   });
   server.run();
   RawClient client(server.port());
@@ -118,7 +117,7 @@ TEST(HttpStream, PiecesBecomeChunksAndTheConnectionStays) {
   EXPECT_EQ(client.read_reply().body, "hello") << "a HEAD has no chunks";
 
   RawClient old(server.port());
-  const Reply until_close = old.ask(get("/s", "1.0"));
+  const Reply until_close = old.ask("GET /s HTTP/1.0\r\n" + kHost + "\r\n");
   EXPECT_EQ(until_close.header("Transfer-Encoding"), "(absent)");
   EXPECT_EQ(until_close.header("Connection"), "close");
   EXPECT_EQ(until_close.body, whole);
@@ -132,12 +131,12 @@ TEST(HttpStream, AThrowingPullTruncatesTheBodyVisibly) {
   TestServer server([&](Router& router) {
     router.on_failure([&heard](const Request&, std::string_view what) { heard = what; });
     router.add("GET", "/s", source_route(watch, [] {
-      return [count = 0](std::string& out) mutable {
-        if (count++ == 1) throw std::runtime_error("the disk");
-        out += "begun";
-        return Pull::kMore;
-      };
-    }));
+                 return [count = 0](std::string& out) mutable {
+                   if (count++ == 1) throw std::runtime_error("the disk");
+                   out += "begun";
+                   return Pull::kMore;
+                 };
+               }));
   });
   server.run();
   RawClient client(server.port());
@@ -156,15 +155,17 @@ TEST(HttpStream, AReaderWhoStopsReadingIsCutAndHoldsNothingUp) {
   config.worker_threads = 1;
   Watch watch;
   std::atomic<int> pull_count{0};
-  TestServer server([&](Router& router) {
-    router.add("GET", "/s", source_route(watch, [&pull_count] {
-      return [&pull_count](std::string& out) {
-        ++pull_count;
-        out.append(64 * 1024, 'x');
-        return Pull::kMore;
-      };
-    }));
-  }, config);
+  TestServer server(
+      [&](Router& router) {
+        router.add("GET", "/s", source_route(watch, [&pull_count] {
+                     return [&pull_count](std::string& out) {
+                       ++pull_count;
+                       out.append(64 * 1024, 'x');
+                       return Pull::kMore;
+                     };
+                   }));
+      },
+      config);
   server.run();
   RawClient slow(server.port(), 4096);
   slow.send(get("/s"));
@@ -179,11 +180,11 @@ TEST(HttpStream, ASlowReaderGetsEveryByte) {
   constexpr int kPieces = 300;
   TestServer server([&](Router& router) {
     router.add("GET", "/s", source_route(watch, [] {
-      return [count = 0](std::string& out) mutable {
-        out.append(32 * 1024, static_cast<char>('a' + count % 26));
-        return ++count == kPieces ? Pull::kEnd : Pull::kMore;
-      };
-    }));
+                 return [count = 0](std::string& out) mutable {
+                   out.append(32 * 1024, static_cast<char>('a' + count % 26));
+                   return ++count == kPieces ? Pull::kEnd : Pull::kMore;
+                 };
+               }));
   });
   server.run();
   RawClient client(server.port(), 4096);
@@ -227,9 +228,12 @@ TEST(HttpStream, IsNeverPulledTwiceAtOnceAndNoWakeIsLost) {
   config.io_threads = 2;
   config.stream_keep_alive_ms = 3'600'000;  // only wakes lead on
   std::atomic<int> overlap_count{0};
-  TestServer server([&overlap_count](Router& router) {
-    router.add("GET", "/s", [&overlap_count](const Request&) { return streamed(std::make_unique<Restless>(overlap_count)); });
-  }, config);
+  TestServer server(
+      [&overlap_count](Router& router) {
+        router.add("GET", "/s",
+                   [&overlap_count](const Request&) { return streamed(std::make_unique<Restless>(overlap_count)); });
+      },
+      config);
   server.run();
   RawClient client(server.port());
   const Reply reply = client.ask(get("/s"));
@@ -282,14 +286,20 @@ TEST(HttpStream, ASignOfLifeIsSentAndThenItIsPulledAgain) {
   ServerConfig config;
   config.stream_keep_alive_ms = 20;
   Watch watch;
-  TestServer server([&watch](Router& router) {
-    router.add("GET", "/s", source_route(watch, [] {
-      return [count = 0](std::string& out) mutable {
-        if (++count == 3) out += "third";
-        return count == 3 ? Pull::kEnd : Pull::kWait;
-      };
-    }, "", ": alive\n\n"));
-  }, config);
+  TestServer server(
+      [&watch](Router& router) {
+        router.add("GET", "/s",
+                   source_route(
+                       watch,
+                       [] {
+                         return [count = 0](std::string& out) mutable {
+                           if (++count == 3) out += "third";
+                           return count == 3 ? Pull::kEnd : Pull::kWait;
+                         };
+                       },
+                       "", ": alive\n\n"));
+      },
+      config);
   server.run();
   RawClient client(server.port());
   const Reply reply = client.ask(get("/s"));
@@ -318,12 +328,16 @@ TEST(HttpStream, StopSaysFarewell) {
   Watch watch;
   TestServer server([&watch](Router& router) {
     router.add("GET", "/waits", source_route(watch, waits_for_ever, "event: bye\n\n"));
-    router.add("GET", "/runs", source_route(watch, [] {
-      return [](std::string& out) {
-        out += "data: more\n\n";
-        return Pull::kMore;
-      };
-    }, "event: bye\n\n"));
+    router.add("GET", "/runs",
+               source_route(
+                   watch,
+                   [] {
+                     return [](std::string& out) {
+                       out += "data: more\n\n";
+                       return Pull::kMore;
+                     };
+                   },
+                   "event: bye\n\n"));
   });
   server.run();
   RawClient waits(server.port());
@@ -348,11 +362,11 @@ TEST(HttpStream, StopEndsWithStreamsIdleAndSlowClientsOpen) {
     router.add("GET", "/stays", source_route(watch, waits_for_ever));  // no farewell: it would like to stay for ever
     router.add("GET", "/bye", source_route(watch, waits_for_ever, "event: bye\n\n"));
     router.add("GET", "/floods", source_route(watch, [] {
-      return [](std::string& out) {
-        out.append(64 * 1024, 'x');
-        return Pull::kMore;
-      };
-    }));
+                 return [](std::string& out) {
+                   out.append(64 * 1024, 'x');
+                   return Pull::kMore;
+                 };
+               }));
   });
   server.run();
   std::vector<std::unique_ptr<RawClient>> clients;

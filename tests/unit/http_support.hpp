@@ -2,20 +2,19 @@
 // Every wait of the client ends after kPatienceMs: a test then fails instead of hanging.
 #pragma once
 
-#include <arpa/inet.h>
-#include <netinet/in.h>
-#include <poll.h>
-#include <sys/socket.h>
-#include <unistd.h>
-
 #include <algorithm>
+#include <arpa/inet.h>
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <netinet/in.h>
 #include <optional>
+#include <poll.h>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <sys/socket.h>
+#include <unistd.h>
 #include <utility>
 
 #include <gtest/gtest.h>
@@ -30,7 +29,7 @@ struct Reply {
   int status = 0;
   Headers headers;
   std::string body;
-  bool is_complete = false;      // the body ended as its framing says
+  bool is_complete = false;  // the body ended as its framing says
   std::string header(std::string_view name) const { return std::string(headers.get(name).value_or("(absent)")); }
 };
 
@@ -38,12 +37,14 @@ class RawClient {
  public:
   explicit RawClient(std::uint16_t port, int receive_buffer_bytes = 0) {
     fd_ = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    if (receive_buffer_bytes > 0) setsockopt(fd_, SOL_SOCKET, SO_RCVBUF, &receive_buffer_bytes, sizeof receive_buffer_bytes);
+    if (receive_buffer_bytes > 0)
+      setsockopt(fd_, SOL_SOCKET, SO_RCVBUF, &receive_buffer_bytes, sizeof receive_buffer_bytes);
     sockaddr_in address{};
     address.sin_family = AF_INET;
     address.sin_port = htons(port);
     address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    if (::connect(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) throw std::runtime_error("connect");
+    if (::connect(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
+      throw std::runtime_error("connect");
   }
   ~RawClient() { close(); }
   RawClient(const RawClient&) = delete;
@@ -163,6 +164,16 @@ class RawClient {
   int fd_ = -1;
   std::string input_;
 };
+
+inline const std::string kHost = "Host: localhost\r\n";
+inline const std::string kGet = "GET /hello HTTP/1.1\r\nHost: localhost\r\n\r\n";
+
+inline std::string post(const std::string& fields, const std::string& body = "") {
+  return "POST /echo HTTP/1.1\r\n" + kHost + fields + "\r\n" + body;
+}
+inline std::string get(const std::string& target, const std::string& fields = kHost) {
+  return "GET " + target + " HTTP/1.1\r\n" + fields + "\r\n";
+}
 
 inline Response text(std::string body) {
   Response response;
