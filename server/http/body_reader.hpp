@@ -1,8 +1,8 @@
 // body_reader: takes a request body out of the bytes that follow a header, by length or by chunks.
-// Why:     Beast decodes the chunks, behind a header made here, not the client's: the gate alone decides what a header
-// means. Promises never to hold more than the limit, to stop at the last byte of the body (a pipelined request stays in
-// the input), and
-//          to refuse what Beast would let pass: chunk extensions and trailers without bound.
+// Why:     Beast decodes the chunks, behind a header made here and not the client's: the gate alone decides what a
+//          header means.
+// Promises never to hold more than the limit, to stop at the last byte of the body (a pipelined request stays in the
+//          input), and to refuse what Beast would let pass: chunk extensions and trailers without bound.
 // Threads: one at a time.
 #pragma once
 

@@ -1,7 +1,6 @@
 // connection: one socket with deadlines: what a session needs of a socket, and nothing of HTTP.
 // Promises that every read and write ends: with bytes, at its deadline, or closed. A deadline leaves the socket open,
-// so that
-//          the reason can still be told (Beast's tcp_stream would close it: no 408 could be sent).
+//          so that the reason can still be told (Beast's tcp_stream would close it: no 408 could be sent).
 // Threads: everything runs on the strand of executor(). At most one of read, write, wait and linger is under way.
 #pragma once
 
@@ -43,12 +42,12 @@ class Connection : public std::enable_shared_from_this<Connection> {
   void disarm();
   /// Appends at most `bytes_max` to input().
   Awaitable<Io> read(std::size_t bytes_max);
-  /// All of `bytes`, which stay where they are until the end; `timeout_ms` is for each step forward. Replaces the armed
-  /// deadline.
+  /// Sends all of `bytes`, which stay where they are until then; `timeout_ms` is for each step forward and replaces the
+  /// armed deadline.
   Awaitable<Io> write(std::string_view bytes, std::int64_t timeout_ms);
 
-  /// Until notify() or `until`; may also return for no reason. Check, then wait: both happen on the strand, nothing is
-  /// lost.
+  /// Until notify() or `until`; may also return for no reason. Check, then wait: both happen on the strand, so that
+  /// nothing is lost between them.
   Awaitable<void> wait(Clock::time_point until);
   void notify();
 

@@ -1,10 +1,8 @@
 // gate: decides from the raw bytes of a request header whether anything after it may see the request.
 // Why raw: a parser that has already folded lines, merged duplicates or dropped blanks hides exactly the shapes by
-// which two
-//          readers of one connection come to disagree about where a request ends. Nothing here is lenient.
+//          which two readers of one connection come to disagree about where a request ends. Nothing here is lenient.
 // Promises that a head that passed has one framing (a length or chunked, never both), one allowed Host, no foreign
-// Origin, a
-//          clean target, and a known method.
+//          Origin, a clean target, and a known method.
 // Errors:  a Refusal, which the session sends as a problem document and then closes the connection.
 // Threads: pure functions over bytes; no socket is needed to test or to fuzz them.
 // Source:  RFC 9112, RFC 9110.
@@ -68,8 +66,8 @@ struct RequestHead {
   std::string request_id;  // the client's if it is acceptable, else empty
 };
 
-/// `bytes` is a header as HeadScanner found it. What could be read before a refusal stands in `head` (for the log and
-/// the id).
+/// `bytes` is a header as HeadScanner found it. What could be read before a refusal stands in `head`, for
+/// the log and the request id.
 std::optional<Refusal> examine(std::string_view bytes, const GatePolicy& policy, RequestHead& head);
 
 }  // namespace colony::server::http

@@ -4,8 +4,7 @@
 //          last piece is still being sent; and that it ends soon after close().
 // Does not keep a connection after a refusal: where the next request begins is then a matter of trust.
 // Threads: start, drain and close from any thread; everything else on the connection's strand, but for the tasks of
-// workers,
-//          which touch request_, response_ and piece_ while the session waits for them.
+//          workers, which touch request_, response_ and piece_ while the session waits for them.
 #pragma once
 
 #include <atomic>

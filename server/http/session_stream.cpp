@@ -42,8 +42,8 @@ class Session::Waker {
   bool is_pending_ = false;
 };
 
-// On a worker. What the source throws ends the connection without the last chunk, so that the client sees a truncated
-// body.
+// On a worker. What the source throws ends the connection without the last chunk, so that the client sees that
+// the body is truncated.
 void Session::pull_stream(bool is_first) {
   pulled_.reset();
   std::string what = "a stream threw what is not a std::exception";
@@ -78,8 +78,8 @@ Awaitable<bool> Session::send_stream(Framing framing) {
     bool is_sent = co_await send_piece(framing, piece_);
     if (!is_sent) co_return false;
     if (*pulled_ == BodySource::Pull::kEnd) break;
-    // A stream with a farewell can be taken up again elsewhere; one without is finished, as long as the server waits
-    // for it.
+    // A stream with a farewell can be taken up again elsewhere; one without goes on to its end, as
+    // long as the server waits for it.
     const std::string_view farewell = response_.stream->farewell();
     if (*pulled_ == BodySource::Pull::kWait) {
       co_await wait_for_stream(farewell);

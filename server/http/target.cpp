@@ -13,8 +13,8 @@ bool is_path_char(char c) {
   return is_alpha(c) || is_digit(c) || std::string_view("-._~!$&'()*+,;=:@/%").find(c) != std::string_view::npos;
 }
 
-// Wider than RFC 3986: browsers leave these brackets and bars unescaped in a query, and nothing here gives them a
-// meaning.
+// Wider than RFC 3986: browsers leave these brackets and bars unescaped in a query, and nothing here gives
+// them a meaning.
 bool is_query_char(char c) {
   return is_path_char(c) || std::string_view("?[]{}|^`\\").find(c) != std::string_view::npos;
 }

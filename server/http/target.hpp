@@ -1,8 +1,7 @@
 // target: the request target and the authorities of Host and Origin, taken apart strictly.
 // Promises that a decoded path starts with '/', is UTF-8, and has no dot segment, no control character and no '/' that
-// was
-//          escaped: a path that passed means the same to every reader after the gate. A decoded query is UTF-8 without
-//          NUL.
+//          was escaped: a path that passed means the same to every reader after the gate. A decoded query is UTF-8
+//          and has no NUL.
 // Does not resolve anything: "." and ".." are refused, never folded; "//" stays two slashes (and finds no route).
 // Errors:  a sentence for the client. Threads: pure.
 #pragma once
