@@ -30,7 +30,8 @@ int run(const std::vector<std::string>& arguments, Environment& env) {
   app.footer(
       "The server: --server, else COLONY_SERVER, else ~/.config/colony/config.toml, else http://127.0.0.1:8080.\n"
       "COLONY_TOKEN is sent as a bearer token.\n"
-      "Exit: 0 done, 1 job failed, 2 usage, 3 not reachable, 4 refused by the server, 5 job cancelled, 130 interrupted.");
+      "Exit: 0 done, 1 job failed, 2 usage, 3 not reachable, 4 refused by the server, 5 job cancelled, 130 "
+      "interrupted.");
   Session session(env);
   Action action;
   app.add_option("--server", session.server_flag, "URL of the server");

@@ -1,5 +1,5 @@
-// commands: what `colony` can do. Each function declares its subcommands; the chosen one sets `action`, which app.cpp then runs.
-// Errors: Failure (failure.hpp). An action returns the exit code.
+// commands: what `colony` can do. Each function declares its subcommands; the chosen one sets `action`, which app.cpp
+// then runs. Errors: Failure (failure.hpp). An action returns the exit code.
 #pragma once
 
 #include <functional>
@@ -13,11 +13,12 @@ namespace colony::client {
 
 using Action = std::function<ExitCode()>;
 
-void add_job_commands(CLI::App& app, Session& session, Action& action);       // list counts show cancel pause resume delete info
+void add_job_commands(CLI::App& app, Session& session,
+                      Action& action);  // list counts show cancel pause resume delete info
 void add_submit_command(CLI::App& app, Session& session, Action& action);
 void add_watch_command(CLI::App& app, Session& session, Action& action);
-void add_data_commands(CLI::App& app, Session& session, Action& action);      // events cells log
-void add_picture_commands(CLI::App& app, Session& session, Action& action);   // series image
+void add_data_commands(CLI::App& app, Session& session, Action& action);     // events cells log
+void add_picture_commands(CLI::App& app, Session& session, Action& action);  // series image
 void add_founders_command(CLI::App& app, Session& session, Action& action);
 
 /// Follows a job to its end. Exit code: kDone, kJobFailed or kCancelled by its state; kInterrupted leaves it running.

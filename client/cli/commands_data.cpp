@@ -1,4 +1,5 @@
-// events, cells and log: tables of any length, copied from the server's stream to the output with one line in memory at a time.
+// events, cells and log: tables of any length, copied from the server's stream to the output with one line in memory at
+// a time.
 #include <algorithm>
 #include <memory>
 #include <optional>
@@ -55,10 +56,12 @@ std::string event_detail(const Json& event) {
   };
   if (kind == "divided" && event.contains("cells") && event["cells"].is_array() && event["cells"].size() == 2) {
     const Json& daughter = event["cells"][1];
-    return "daughter " + member_text(daughter, "cell_id") + " " + place(daughter) + "  " + pair("fitness", "fitness", 3);
+    return "daughter " + member_text(daughter, "cell_id") + " " + place(daughter) + "  " +
+           pair("fitness", "fitness", 3);
   }
   if ((kind == "founded" || kind == "moved") && event.contains("cell")) return place(event["cell"]);
-  if (kind == "inhibited") return pair("fitness", "fitness", 3) + pair("free share", "free_share", 3) + pair("due", "due_h", 2);
+  if (kind == "inhibited")
+    return pair("fitness", "fitness", 3) + pair("free share", "free_share", 3) + pair("due", "due_h", 2);
   if (kind == "settled") return pair("deformed volume", "deformed_volume_um3", 0);
   if (kind == "finished") return pair("reason", "reason", 0) + pair("cells", "cell_count", 0);
   return "";
@@ -75,10 +78,12 @@ const std::vector<Column>& event_columns() {
 
 const std::vector<Column>& cell_columns() {
   static const std::vector<Column> columns = {
-      {"CELL", 7, member("cell_id")},      {"PARENT", 7, member("parent_id")}, {"GEN", 4, member("generation")},
-      {"ACTIVITY", -9, member("activity")}, {"X_UM", 9, member("x_um", 1)},     {"Y_UM", 9, member("y_um", 1)},
-      {"A_UM", 6, member("a_um", 1)},      {"B_UM", 6, member("b_um", 1)},     {"C_UM", 6, member("c_um", 1)},
-      {"BORN_H", 8, member("born_h", 2)},  {"DUE_H", 8, member("due_h", 2)},   {"VOLUME_UM3", 10, member("volume_um3", 0)}};
+      {"CELL", 7, member("cell_id")},   {"PARENT", 7, member("parent_id")},
+      {"GEN", 4, member("generation")}, {"ACTIVITY", -9, member("activity")},
+      {"X_UM", 9, member("x_um", 1)},   {"Y_UM", 9, member("y_um", 1)},
+      {"A_UM", 6, member("a_um", 1)},   {"B_UM", 6, member("b_um", 1)},
+      {"C_UM", 6, member("c_um", 1)},   {"BORN_H", 8, member("born_h", 2)},
+      {"DUE_H", 8, member("due_h", 2)}, {"VOLUME_UM3", 10, member("volume_um3", 0)}};
   return columns;
 }
 
@@ -104,18 +109,23 @@ void report_file(Session& session, const Output& output, const std::string& path
   }
 }
 
-/// Follows the server's bytes to the output in the format asked for.
-ExitCode fetch(Session& session, Target target, const DataOptions& options, const std::vector<Column>& columns) {
+/// Copies the server's bytes to the output in the format asked for. `json_is_whole`: its JSON form has no pages.
+ExitCode fetch(Session& session, const Target& target, const DataOptions& options, const std::vector<Column>& columns,
+               bool json_is_whole) {
   if (options.csv + options.ndjson + session.json > 1) {
     throw Failure(ExitCode::kUsage, "--csv, --ndjson and --json: only one of them");
   }
   HttpRequest request;
   request.target = target.text();
-  request.accept = options.csv ? "text/csv" : "application/x-ndjson";
+  const bool copy = options.csv || options.ndjson || (session.json && json_is_whole);
+  request.accept = options.csv                     ? "text/csv"
+                   : session.json && json_is_whole ? "application/json"
+                                                   : "application/x-ndjson";
   Output output(session.env, options.output);
   const bool table = !options.csv && !options.ndjson && !session.json;
 
-  // With --json the list is made from the line stream, which has no page limit: complete, and still one item in memory.
+  // With --json a list that the server gives in pages is made from its line stream instead: complete, one item in
+  // memory.
   bool first = true;
   LineSplitter lines([&](std::string_view line) {
     if (table) {
@@ -127,13 +137,12 @@ ExitCode fetch(Session& session, Target target, const DataOptions& options, cons
     }
     first = false;
   });
-  const bool copy = options.csv || options.ndjson;
-  const HttpResponse response = session.client().receive(request, [&](std::string_view bytes) {
-    copy ? output.write(bytes) : lines.feed(bytes);
-  });
+  const HttpResponse response = session.client().receive(
+      request, [&](std::string_view bytes) { copy ? output.write(bytes) : lines.feed(bytes); });
   require_ok(response);
   lines.finish();
-  if (session.json) output.write(first ? "{\"items\": [], \"next\": null}\n" : "\n], \"next\": null}\n");
+  if (session.json && copy) output.write("\n");
+  if (session.json && !copy) output.write(first ? "{\"items\": [], \"next\": null}\n" : "\n], \"next\": null}\n");
   if (table && first) session.env.err << "nothing to show\n";
   output.finish();
   report_file(session, output, options.output);
@@ -144,7 +153,8 @@ struct StreamEnded {
   std::string state;
 };
 
-/// The live stream. A lost connection is made again after the last event that was written: nothing twice, nothing missing.
+/// The live stream. A lost connection is made again after the last event that was written: nothing twice, nothing
+/// missing.
 ExitCode follow(Session& session, const std::string& id, const DataOptions& options) {
   if (options.csv || options.limit) throw Failure(ExitCode::kUsage, "--follow: not together with --csv or --limit");
   Output output(session.env, options.output);
@@ -167,8 +177,11 @@ ExitCode follow(Session& session, const std::string& id, const DataOptions& opti
     std::string why = "the stream ended before the job did";
     try {
       HttpRequest request;
-      request.target =
-          job_target(id, "/events").add_if("after", options.after).add_if("kind", options.kind).add_if("cell_id", options.cell_id).text();
+      request.target = job_target(id, "/events")
+                           .add_if("after", options.after)
+                           .add_if("kind", options.kind)
+                           .add_if("cell_id", options.cell_id)
+                           .text();
       request.accept = "text/event-stream";
       if (!parser.last_id().empty()) request.headers.emplace_back("Last-Event-ID", parser.last_id());
       parser.reconnect();
@@ -212,7 +225,8 @@ void add_data_commands(CLI::App& app, Session& session, Action& action) {
   CLI::App* command = add_table_command(app, "events", "The history of a job", *events);
   command->add_flag("--csv", events->csv, "CSV");
   command->add_option("--after", events->after, "Only events after this seq");
-  command->add_option("--kind", events->kind, "Only events of this kind (founded, divided, inhibited, settled, moved, senesced, finished)");
+  command->add_option("--kind", events->kind,
+                      "Only events of this kind (founded, divided, inhibited, settled, moved, senesced, finished)");
   command->add_option("--cell-id", events->cell_id, "Only events of this cell");
   command->add_option("--limit", events->limit, "At most this many");
   command->add_flag("--follow", events->follow, "Go on with events as they happen, to the end of the job");
@@ -221,9 +235,12 @@ void add_data_commands(CLI::App& app, Session& session, Action& action) {
       const std::string id = resolve_job_id(session, events->id);
       if (events->follow) return follow(session, id, *events);
       return fetch(session,
-                   job_target(id, "/events").add_if("after", events->after).add_if("kind", events->kind)
-                       .add_if("cell_id", events->cell_id).add_if("limit", events->limit),
-                   *events, event_columns());
+                   job_target(id, "/events")
+                       .add_if("after", events->after)
+                       .add_if("kind", events->kind)
+                       .add_if("cell_id", events->cell_id)
+                       .add_if("limit", events->limit),
+                   *events, event_columns(), false);
     };
   });
 
@@ -234,7 +251,7 @@ void add_data_commands(CLI::App& app, Session& session, Action& action) {
   command->callback([&session, &action, cells] {
     action = [&session, cells] {
       const std::string id = resolve_job_id(session, cells->id);
-      return fetch(session, job_target(id, "/cells").add_if("at_h", cells->at_h), *cells, cell_columns());
+      return fetch(session, job_target(id, "/cells").add_if("at_h", cells->at_h), *cells, cell_columns(), true);
     };
   });
 
@@ -243,7 +260,7 @@ void add_data_commands(CLI::App& app, Session& session, Action& action) {
   command->callback([&session, &action, log] {
     action = [&session, log] {
       const std::string id = resolve_job_id(session, log->id);
-      return fetch(session, job_target(id, "/log"), *log, log_columns());
+      return fetch(session, job_target(id, "/log"), *log, log_columns(), false);
     };
   });
 }

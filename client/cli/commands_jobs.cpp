@@ -11,7 +11,8 @@ namespace colony::client {
 namespace {
 
 struct ListOptions {
-  std::optional<std::string> state, kind, name, label, cursor;
+  std::optional<std::string> state, kind, name, cursor;
+  std::vector<std::string> labels;
   std::string limit = "50";
 };
 
@@ -40,8 +41,10 @@ ExitCode list_jobs(Session& session, const ListOptions& options) {
     const std::int64_t left = limit - static_cast<std::int64_t>(rows.size());
     const std::string page = std::to_string(session.json ? limit : std::min<std::int64_t>(left, 500));
     HttpRequest request;
-    request.target = Target("/v1/jobs").add_if("state", options.state).add_if("kind", options.kind).add_if("name", options.name)
-                         .add_if("label", options.label).add("limit", page).add_if("cursor", cursor).text();
+    Target target("/v1/jobs");
+    target.add_if("state", options.state).add_if("kind", options.kind).add_if("name", options.name).add("limit", page);
+    for (const std::string& label : options.labels) target.add("label", label);
+    request.target = target.add_if("cursor", cursor).text();
     const HttpResponse response = session.client().send(request);
     require_ok(response);
     if (session.json) {
@@ -105,8 +108,8 @@ ExitCode command_job(Session& session, const std::string& text, const std::strin
   }
   const Json job = Json::parse(response.body, nullptr, false);
   const std::string state = job.is_object() ? state_text(job) : "-";
-  session.env.out << id << ": " << (response.status == 200 ? "already " : "") << (state == "-" ? verb + " accepted" : state)
-                  << '\n';
+  session.env.out << id << ": " << (response.status == 200 ? "already " : "")
+                  << (state == "-" ? verb + " accepted" : state) << '\n';
   return ExitCode::kDone;
 }
 
@@ -133,10 +136,11 @@ void add_job_commands(CLI::App& app, Session& session, Action& action) {
   list->add_option("--state", options->state, "queued, running, paused, succeeded, failed or cancelled");
   list->add_option("--kind", options->kind, "Kind of job");
   list->add_option("--name", options->name, "Exact name");
-  list->add_option("--label", options->label, "Label as key:value");
+  list->add_option("--label", options->labels, "Label as key:value (repeatable: all of them)")->allow_extra_args(false);
   list->add_option("--limit", options->limit, "How many at most")->capture_default_str();
   list->add_option("--cursor", options->cursor, "Where to go on: `next` of the page before (with --json)");
-  list->callback([&session, &action, options] { action = [&session, options] { return list_jobs(session, *options); }; });
+  list->callback(
+      [&session, &action, options] { action = [&session, options] { return list_jobs(session, *options); }; });
 
   CLI::App* counts = app.add_subcommand("counts", "How many jobs are in each state");
   counts->callback([&] { action = [&session] { return show_json(session, "/v1/jobs/counts"); }; });
@@ -150,18 +154,14 @@ void add_job_commands(CLI::App& app, Session& session, Action& action) {
     command->add_option("ID", *id, "Job id, or its unique end")->required();
     command->callback([&session, &action, id, run] { action = [&session, id, run] { return run(session, *id); }; });
   };
-  with_id("show", "One job", [](Session& s, const std::string& id) {
-    return show_json(s, job_target(resolve_job_id(s, id)).text());
-  });
-  with_id("cancel", "End a job; what it grew so far stays", [](Session& s, const std::string& id) {
-    return command_job(s, id, "cancel");
-  });
-  with_id("pause", "Stop a job until it is resumed", [](Session& s, const std::string& id) {
-    return command_job(s, id, "pause");
-  });
-  with_id("resume", "Let a paused job go on", [](Session& s, const std::string& id) {
-    return command_job(s, id, "resume");
-  });
+  with_id("show", "One job",
+          [](Session& s, const std::string& id) { return show_json(s, job_target(resolve_job_id(s, id)).text()); });
+  with_id("cancel", "End a job; what it grew so far stays",
+          [](Session& s, const std::string& id) { return command_job(s, id, "cancel"); });
+  with_id("pause", "Stop a job until it is resumed",
+          [](Session& s, const std::string& id) { return command_job(s, id, "pause"); });
+  with_id("resume", "Let a paused job go on",
+          [](Session& s, const std::string& id) { return command_job(s, id, "resume"); });
   with_id("delete", "Remove a job that has ended, and its history, for good", delete_job);
 }
 

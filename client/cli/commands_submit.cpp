@@ -41,8 +41,10 @@ std::vector<Assignment> assignments_of(const SubmitOptions& options) {
   if (options.preset) out.push_back({{"preset"}, *options.preset, "--preset"});
   if (options.seed) out.push_back({{"seed"}, integer_option("--seed", *options.seed), "--seed"});
   if (options.name) out.push_back({{"name"}, *options.name, "--name"});
-  if (options.until_cells) out.push_back({{"until", "cells"}, integer_option("--until-cells", *options.until_cells), "--until-cells"});
-  if (options.until_time) out.push_back({{"until", "time_h"}, number_text("--until-time", *options.until_time), "--until-time"});
+  if (options.until_cells)
+    out.push_back({{"until", "cells"}, integer_option("--until-cells", *options.until_cells), "--until-cells"});
+  if (options.until_time)
+    out.push_back({{"until", "time_h"}, number_text("--until-time", *options.until_time), "--until-time"});
   for (const std::string& label : options.labels) out.push_back(parse_label(label));
   for (const std::string& set : options.sets) out.push_back(parse_set(set));
   return out;
@@ -51,7 +53,8 @@ std::vector<Assignment> assignments_of(const SubmitOptions& options) {
 std::string spec_body(Session& session, const SubmitOptions& options) {
   const std::vector<Assignment> assignments = assignments_of(options);
   if (options.file.empty() && assignments.empty()) {
-    throw Failure(ExitCode::kUsage, "nothing to submit: give a SPEC file, or flags such as --preset paper --seed 1 --until-cells 180");
+    throw Failure(ExitCode::kUsage,
+                  "nothing to submit: give a SPEC file, or flags such as --preset paper --seed 1 --until-cells 180");
   }
   std::string text = options.file.empty() ? "{}" : read_input(session.env, options.file, kSpecBytesMax);
   if (assignments.empty()) return text;  // byte for byte: its mistakes are then reported at their own place
@@ -91,13 +94,15 @@ ExitCode submit(Session& session, const SubmitOptions& options) {
     response = session.send_patiently(request);
   } catch (const Failure& failure) {
     if (failure.code() != ExitCode::kNotReachable && failure.code() != ExitCode::kInterrupted) throw;
-    throw Failure(failure.code(), std::string(failure.what()) +
-                                      "\n  the job may have been stored all the same; submitting again with --idempotency-key " +
-                                      key + " cannot make a second one");
+    throw Failure(failure.code(),
+                  std::string(failure.what()) +
+                      "\n  the job may have been stored all the same; submitting again with --idempotency-key " + key +
+                      " cannot make a second one");
   }
   require_ok(response);
   const Json job = body_json(response);
-  const std::string id = job.is_object() && job.contains("id") && job["id"].is_string() ? job["id"].get<std::string>() : "";
+  const std::string id =
+      job.is_object() && job.contains("id") && job["id"].is_string() ? job["id"].get<std::string>() : "";
   if (id.empty()) throw Failure(ExitCode::kRefused, "the server's answer names no job id");
   if (session.json) {
     session.env.out << job.dump() << '\n';
@@ -123,15 +128,18 @@ void add_submit_command(CLI::App& app, Session& session, Action& action) {
   command->add_option("--label", options->labels, "Label as key=value (repeatable)")->allow_extra_args(false);
   command->add_option("--until-cells", options->until_cells, "End at this many cells");
   command->add_option("--until-time", options->until_time, "End at this model time, h");
-  command->add_option("--set", options->sets, "A field, as model.cycle.mean_h=10; the value is JSON, else a string (repeatable)")
+  command
+      ->add_option("--set", options->sets,
+                   "A field, as model.cycle.mean_h=10; the value is JSON, else a string (repeatable)")
       ->allow_extra_args(false);
-  command->add_flag("--dry-run", options->dry_run, "Only check: print the complete spec and an estimate; nothing is stored");
-  command->add_option("--idempotency-key", options->key, "The same key and spec never make a second job (default: a new random key)");
+  command->add_flag("--dry-run", options->dry_run,
+                    "Only check: print the complete spec and an estimate; nothing is stored");
+  command->add_option("--idempotency-key", options->key,
+                      "The same key and spec never make a second job (default: a new random key)");
   command->add_flag("--watch", options->watch, "Then follow it to its end");
   command->add_flag("-q,--quiet", options->quiet, "Print the id alone");
-  command->callback([&session, &action, options] {
-    action = [&session, options] { return submit(session, *options); };
-  });
+  command->callback(
+      [&session, &action, options] { action = [&session, options] { return submit(session, *options); }; });
 }
 
 }  // namespace colony::client

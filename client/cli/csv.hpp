@@ -1,6 +1,6 @@
-// csv: reads a table as RFC 4180 writes it: quoted fields, doubled quotes, line ends inside quotes, CRLF or LF, an optional byte
-// order mark. Values stay text: what is a number is the reader's question.
-// Errors:  Failure kUsage with `name:line: message`: an open quote, text after a closing quote, a quote inside a bare field, a row
+// csv: reads a table as RFC 4180 writes it: quoted fields, doubled quotes, line ends inside quotes, CRLF or LF, an
+// optional byte order mark. Values stay text: what is a number is the reader's question. Errors:  Failure kUsage with
+// `name:line: message`: an open quote, text after a closing quote, a quote inside a bare field, a row
 //          whose field count differs from the header's, an empty table, equal column names, a NUL byte.
 #pragma once
 

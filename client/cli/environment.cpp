@@ -1,13 +1,12 @@
 #include "client/cli/environment.hpp"
 
-#include <fcntl.h>
-#include <poll.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <cctype>
+#include <fcntl.h>
+#include <poll.h>
 #include <random>
 #include <system_error>
+#include <unistd.h>
 
 namespace colony::client {
 

@@ -1,4 +1,5 @@
-// environment: what a command may touch of the process around it, as values, so that tests run commands in their own process.
+// environment: what a command may touch of the process around it, as values, so that tests run commands in their own
+// process.
 #pragma once
 
 #include <chrono>
@@ -28,11 +29,11 @@ class Interrupt {
   int pipe_[2];
 };
 
-/// How often and how patiently to ask again. Delays double from `first` to `max`, each shortened at random by up to a quarter
-/// so that many clients of a restarted server do not come back together.
+/// How often and how patiently to ask again. Delays double from `first` to `max`, each shortened at random by up to a
+/// quarter so that many clients of a restarted server do not come back together.
 struct RetryPolicy {
-  int attempts_max = 5;                               // of a submit
-  int reconnects_max = 20;                            // of a watch, in a row
+  int attempts_max = 5;     // of a submit
+  int reconnects_max = 20;  // of a watch, in a row
   std::chrono::milliseconds first{500};
   std::chrono::milliseconds max{30'000};
 };

@@ -38,7 +38,8 @@ class NotReachable : public Failure {
   bool transient_;
 };
 
-/// Whoever reads our standard output has closed it (`colony events ID | head`): nothing to report, nothing to go on with.
+/// Whoever reads our standard output has closed it (`colony events ID | head`): nothing to report, nothing to go on
+/// with.
 class OutputClosed : public std::runtime_error {
  public:
   OutputClosed() : std::runtime_error("standard output is closed") {}

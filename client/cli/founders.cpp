@@ -27,12 +27,14 @@ std::string column_list(const CsvTable& table) {
   return out;
 }
 
-/// "time [h]" and "Time_h" style headers meet in their letters: lower case, no unit in brackets, letters and digits only.
+/// "time [h]" and "Time_h" style headers meet in their letters: lower case, no unit in brackets, letters and digits
+/// only.
 std::string plain_name(const std::string& column) {
   std::string out;
   for (const char c : column) {
     if (c == '[' || c == '(') break;
-    if (std::isalnum(static_cast<unsigned char>(c))) out += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    if (std::isalnum(static_cast<unsigned char>(c)))
+      out += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   }
   return out;
 }
@@ -42,8 +44,9 @@ const std::vector<std::string> kXNames = {"x",         "xpx",       "posx", "pos
                                           "xcentroid", "locationx", "cx",   "xm",        "xcoord",    "xcoordinate"};
 const std::vector<std::string> kYNames = {"y",         "ypx",       "posy", "positiony", "yposition", "centroidy",
                                           "ycentroid", "locationy", "cy",   "ym",        "ycoord",    "ycoordinate"};
-const std::vector<std::string> kTrackNames = {"track", "trackid", "tracknumber", "colony", "colonyid", "object",
-                                              "objectid", "objectnumber", "id", "label", "cell", "cellid"};
+const std::vector<std::string> kTrackNames = {"track",    "trackid", "tracknumber", "colony",
+                                              "colonyid", "object",  "objectid",    "objectnumber",
+                                              "id",       "label",   "cell",        "cellid"};
 
 /// The index of the column asked for, or of the one with a usual name; nullopt if none has.
 std::optional<std::size_t> find_column(const CsvTable& table, const std::string& asked, const std::string& option,
@@ -72,7 +75,9 @@ std::optional<std::size_t> find_column(const CsvTable& table, const std::string&
 std::size_t need_column(const CsvTable& table, const std::string& asked, const std::string& option,
                         const std::vector<std::string>& usual) {
   const auto found = find_column(table, asked, option, usual);
-  if (!found) fail(table, "no column looks like " + option.substr(2) + "; name it with " + option + "; the columns are " + column_list(table));
+  if (!found)
+    fail(table, "no column looks like " + option.substr(2) + "; name it with " + option + "; the columns are " +
+                    column_list(table));
   return *found;
 }
 
@@ -82,8 +87,9 @@ double number_in(const CsvTable& table, const CsvRow& row, std::size_t column) {
   while (!text.empty() && text.back() == ' ') text.remove_suffix(1);
   const auto value = to_number(text);
   if (!value) {
-    fail_at(table, row.line, "column '" + printable(table.header[column]) + "': '" + printable(row.fields[column]) +
-                                 "' is not a finite number");
+    fail_at(table, row.line,
+            "column '" + printable(table.header[column]) + "': '" + printable(row.fields[column]) +
+                "' is not a finite number");
   }
   return *value;
 }
@@ -96,8 +102,10 @@ std::vector<const CsvRow*> rows_of_time(const CsvTable& table, const FounderOpti
   }
   const auto column = find_column(table, options.time_column, "--time-column", kTimeNames);
   if (!column) {
-    fail(table, "no column looks like a time; name it with --time-column, or say --no-time if the table is of one moment; "
-                "the columns are " + column_list(table));
+    fail(table,
+         "no column looks like a time; name it with --time-column, or say --no-time if the table is of one moment; "
+         "the columns are " +
+             column_list(table));
   }
   out.time_column = table.header[*column];
   std::vector<double> times(table.rows.size());
@@ -120,7 +128,8 @@ double distance_um(const Founder& a, const Founder& b) { return std::hypot(a.x_u
 
 double rounded(double value_um) { return std::round(value_um * 1000.0) / 1000.0 + 0.0; }
 
-/// Keeps a founder unless an earlier kept one is nearer than `limit`. A grid with that spacing: only nine squares to look at.
+/// Keeps a founder unless an earlier kept one is nearer than `limit`. A grid with that spacing: only nine squares to
+/// look at.
 void drop_crowded(Founders& founders, double limit_um) {
   std::map<std::pair<std::int64_t, std::int64_t>, std::vector<std::size_t>> grid;
   std::vector<Founder> kept;
@@ -157,13 +166,15 @@ void check_positions(const CsvTable& table, const Founders& founders, const Foun
   for (const Founder& founder : founders.kept) {
     const auto [at, is_new] = seen.emplace(std::pair{founder.x_um, founder.y_um}, founder.line);
     if (!is_new) {
-      fail_at(table, founder.line, "the same position as in line " + std::to_string(at->second) +
-                                       " (--min-distance-um drops the later of two that are too close)");
+      fail_at(table, founder.line,
+              "the same position as in line " + std::to_string(at->second) +
+                  " (--min-distance-um drops the later of two that are too close)");
     }
     const double radius_um = std::hypot(founder.x_um, founder.y_um);
     if (options.dish_radius_um && radius_um >= *options.dish_radius_um) {
-      fail_at(table, founder.line, "the colony is " + fixed(radius_um, 1) + " um from the centre, outside --dish-radius-um " +
-                                       fixed(*options.dish_radius_um, 1));
+      fail_at(table, founder.line,
+              "the colony is " + fixed(radius_um, 1) + " um from the centre, outside --dish-radius-um " +
+                  fixed(*options.dish_radius_um, 1));
     }
   }
 }
@@ -182,7 +193,8 @@ Founders select_founders(const CsvTable& table, const FounderOptions& options) {
   out.y_column = table.header[y];
   if (track) out.track_column = table.header[*track];
   if (rows.size() > kFoundersMax) {
-    fail(table, std::to_string(rows.size()) + " colonies at that time; a job takes at most " + std::to_string(kFoundersMax));
+    fail(table,
+         std::to_string(rows.size()) + " colonies at that time; a job takes at most " + std::to_string(kFoundersMax));
   }
 
   std::map<std::string, std::size_t> line_of_track;
@@ -195,8 +207,9 @@ Founders select_founders(const CsvTable& table, const FounderOptions& options) {
       founder.track = row->fields[*track];
       const auto [at, is_new] = line_of_track.emplace(founder.track, row->line);
       if (!is_new) {
-        fail_at(table, row->line, "column '" + printable(out.track_column) + "': '" + printable(founder.track) +
-                                      "' stands for the same time in line " + std::to_string(at->second) + " already");
+        fail_at(table, row->line,
+                "column '" + printable(out.track_column) + "': '" + printable(founder.track) +
+                    "' stands for the same time in line " + std::to_string(at->second) + " already");
       }
     }
     out.kept.push_back(std::move(founder));
@@ -268,24 +281,28 @@ std::string founders_report(const Founders& founders, const FounderOptions& opti
     high_y = i == 0 ? founder.y_um : std::max(high_y, founder.y_um);
   }
   out += "scale " + Json(options.um_per_px).dump() + " um per px; origin at " +
-         (options.field_px ? "the middle of the field" : "the mean position") + " (" + fixed(founders.centre_x_px, 1) + ", " +
-         fixed(founders.centre_y_px, 1) + ") px; y " + (options.y_up ? "taken as it is" : "turned to run up") + "\n";
+         (options.field_px ? "the middle of the field" : "the mean position") + " (" + fixed(founders.centre_x_px, 1) +
+         ", " + fixed(founders.centre_y_px, 1) + ") px; y " + (options.y_up ? "taken as it is" : "turned to run up") +
+         "\n";
   out += "extent: x " + fixed(low_x, 0) + " to " + fixed(high_x, 0) + " um, y " + fixed(low_y, 0) + " to " +
-         fixed(high_y, 0) + " um, farthest from the origin " + fixed(radius_um, 0) + " um\n";
+         fixed(high_y, 0) + " um, farthest from the origin " + fixed(radius_um, 0) + " um; wall of the dish: " +
+         (options.dish_radius_um ? fixed(*options.dish_radius_um, 0) + " um" : "as the preset has it") + "\n";
   if (const auto pair = closest_pair(founders.kept)) {
     out += "closest two: " + fixed(pair->distance_um, 1) + " um (" +
            lines_of(founders.kept[pair->first], founders.kept[pair->second]) + ")\n";
   }
   if (options.min_distance_um > 0) {
     for (const DroppedFounder& drop : founders.dropped) {
-      out += "DROPPED line " + std::to_string(drop.founder.line) + ": " + fixed(drop.distance_um, 1) + " um from line " +
-             std::to_string(drop.near.line) + "\n";
+      out += "DROPPED line " + std::to_string(drop.founder.line) + ": " + fixed(drop.distance_um, 1) +
+             " um from line " + std::to_string(drop.near.line) + "\n";
     }
-    out += (founders.dropped.empty() ? "nothing dropped: none" : "DROPPED " + std::to_string(founders.dropped.size()) + " colonies that were") +
+    out += (founders.dropped.empty() ? "nothing dropped: none"
+                                     : "DROPPED " + std::to_string(founders.dropped.size()) + " colonies that were") +
            " closer than " + fixed(options.min_distance_um, 1) + " um to an earlier one\n";
   }
-  out += "note: each colony of the table starts here as one cell; a tracked colony is several cells already "
-         "(about 4-5 in the H3122 clonogenic data)\n";
+  out +=
+      "note: each colony of the table starts here as one cell; a tracked colony is several cells already "
+      "(about 4-5 in the H3122 clonogenic data)\n";
   return out;
 }
 

@@ -1,7 +1,7 @@
-// founders: from a colony-tracking table (one row for each colony and time, positions in pixels) to the founders of a job.
-// Method:  the rows of one time; px to um; origin at the centre; y up (image rows run down). One cell for each colony.
-// Units:   um out; px in, um_per_px between them. Positions are rounded to 0.001 um.
-// Errors:  Failure kUsage with `file:line:` where a line is to blame; nothing is skipped but what min_distance_um drops, and
+// founders: from a colony-tracking table (one row for each colony and time, positions in pixels) to the founders of a
+// job. Method:  the rows of one time; px to um; origin at the centre; y up (image rows run down). One cell for each
+// colony. Units:   um out; px in, um_per_px between them. Positions are rounded to 0.001 um. Errors:  Failure kUsage
+// with `file:line:` where a line is to blame; nothing is skipped but what min_distance_um drops, and
 //          that is in the report.
 // Threads: pure.
 #pragma once
@@ -22,9 +22,10 @@ struct FounderOptions {
   bool without_time = false;                                  // the whole table is one moment
   std::optional<double> time;                                 // none: the earliest
   double um_per_px = 1.0;
-  std::optional<std::pair<double, double>> field_px;  // none: the centre is the mean position; else the middle of this image
-  bool y_up = false;                                  // the table's y already runs up
-  double min_distance_um = 0.0;                       // 0: off
+  std::optional<std::pair<double, double>>
+      field_px;                  // none: the centre is the mean position; else the middle of this image
+  bool y_up = false;             // the table's y already runs up
+  double min_distance_um = 0.0;  // 0: off
   std::optional<double> dish_radius_um;
 };
 
@@ -45,7 +46,7 @@ struct Founders {
   std::vector<DroppedFounder> dropped;
   std::string time_column, x_column, y_column, track_column;
   std::optional<double> time;
-  std::size_t other_row_count = 0;                // rows of other times
+  std::size_t other_row_count = 0;  // rows of other times
   double centre_x_px = 0.0, centre_y_px = 0.0;
 };
 

@@ -1,10 +1,10 @@
 #include "client/cli/http_client.hpp"
 
-#include <curl/curl.h>
-
 #include <algorithm>
 #include <cctype>
 #include <exception>
+
+#include <curl/curl.h>
 
 #include "client/cli/failure.hpp"
 
@@ -81,7 +81,8 @@ struct HttpClient::Handles {
   }
 };
 
-/// What curl's callbacks write into. An exception must not pass through curl's C frames: it is kept and thrown again outside.
+/// What curl's callbacks write into. An exception must not pass through curl's C frames: it is kept and thrown again
+/// outside.
 class HttpClient::Transfer {
  public:
   Transfer(CURL* easy, const Sink* sink) : easy_(easy), sink_(sink) {}
@@ -209,10 +210,10 @@ HttpResponse HttpClient::receive(const HttpRequest& request, const Sink& sink, s
   }
   if (result != CURLE_OK) {
     const std::string why = error_text[0] != '\0' ? error_text : curl_easy_strerror(result);
-    throw NotReachable(transfer.received_bytes > 0
-                           ? "the connection to " + settings_.server + " was lost after " +
-                                 std::to_string(transfer.received_bytes) + " bytes: " + why
-                           : "cannot reach " + settings_.server + ": " + why + " (--server or COLONY_SERVER names another)",
+    throw NotReachable(transfer.received_bytes > 0 ? "the connection to " + settings_.server + " was lost after " +
+                                                         std::to_string(transfer.received_bytes) + " bytes: " + why
+                                                   : "cannot reach " + settings_.server + ": " + why +
+                                                         " (--server or COLONY_SERVER names another)",
                        is_transient(result));
   }
   long status = 0;

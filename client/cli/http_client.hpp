@@ -34,7 +34,7 @@ class Target {
 
 struct HttpRequest {
   std::string method = "GET";
-  std::string target;                                        // starts with '/'
+  std::string target;  // starts with '/'
   std::string accept = "application/json";
   std::vector<std::pair<std::string, std::string>> headers;  // besides Accept, Authorization and the body's
   std::optional<std::string> json_body;
@@ -57,8 +57,8 @@ class HttpClient {
   /// The whole answer in memory, at most kBodyBytesMax.
   HttpResponse send(const HttpRequest& request);
 
-  /// The body of a 2xx answer goes to `sink` piece by piece; any other answer comes back in memory. `silence_max`: give up when
-  /// the server sends nothing for so long.
+  /// The body of a 2xx answer goes to `sink` piece by piece; any other answer comes back in memory. `silence_max`: give
+  /// up when the server sends nothing for so long.
   HttpResponse receive(const HttpRequest& request, const Sink& sink, std::chrono::seconds silence_max = kSilenceMax);
 
   const std::string& server() const { return settings_.server; }

@@ -1,12 +1,12 @@
 // main: gives run() the real process: its streams, its terminal, its Ctrl-C.
-#include <curl/curl.h>
-#include <sys/ioctl.h>
-#include <unistd.h>
-
 #include <csignal>
 #include <cstdlib>
 #include <exception>
 #include <iostream>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <curl/curl.h>
 
 #include "client/cli/app.hpp"
 #include "client/cli/failure.hpp"

@@ -1,14 +1,13 @@
 #include "client/cli/output.hpp"
 
-#include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
+#include <fcntl.h>
 #include <filesystem>
 #include <fstream>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "client/cli/failure.hpp"
 #include "client/cli/text.hpp"
@@ -103,7 +102,8 @@ std::string read_input(Environment& env, const std::string& path, std::size_t by
   while (in.read(buffer, sizeof buffer) || in.gcount() > 0) {
     text.append(buffer, static_cast<std::size_t>(in.gcount()));
     if (text.size() > bytes_max) {
-      throw Failure(ExitCode::kUsage, name + ": larger than this command's limit of " + std::to_string(bytes_max) + " bytes");
+      throw Failure(ExitCode::kUsage,
+                    name + ": larger than this command's limit of " + std::to_string(bytes_max) + " bytes");
     }
   }
   if (in.bad()) throw Failure(ExitCode::kUsage, name + ": cannot be read");

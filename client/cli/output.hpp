@@ -1,5 +1,6 @@
 // output: where data goes: standard output, or a file that appears whole or not at all.
-// Method:  a file is written beside its final name and renamed by finish(); without finish() it is removed again. What exists and
+// Method:  a file is written beside its final name and renamed by finish(); without finish() it is removed again. What
+// exists and
 //          is not a regular file (/dev/null, a pipe) is written directly.
 // Errors:  Failure kUsage naming the path; OutputClosed when standard output's reader is gone.
 #pragma once

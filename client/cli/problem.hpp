@@ -9,8 +9,8 @@
 
 namespace colony::client {
 
-/// `<title>: <detail>`, one line `  <pointer or parameter>: <message>` for each error, the request id, when to try again.
-/// An answer that is no problem document (a proxy's page) is quoted, shortened.
+/// `<title>: <detail>`, one line `  <pointer or parameter>: <message>` for each error, the request id, when to try
+/// again. An answer that is no problem document (a proxy's page) is quoted, shortened.
 std::string problem_text(const HttpResponse& response);
 
 /// Throws Failure kRefused unless the answer is 2xx.

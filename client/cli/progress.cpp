@@ -25,7 +25,8 @@ std::string rate_text(double cells_per_s) { return fixed(cells_per_s, cells_per_
 Progress progress_from(const Json& object) {
   Progress out;
   if (!object.is_object()) return out;
-  if (const auto state = object.find("state"); state != object.end() && state->is_string()) out.state = state->get<std::string>();
+  if (const auto state = object.find("state"); state != object.end() && state->is_string())
+    out.state = state->get<std::string>();
   out.time_h = number_member(object, "time_h").value_or(0.0);
   out.cells = static_cast<std::int64_t>(number_member(object, "cells").value_or(0.0));
   out.fraction = number_member(object, "fraction");
@@ -56,7 +57,8 @@ std::string progress_bar(const Progress& progress, int width) {
   };
   const auto room = static_cast<std::size_t>(std::max(width, 0));
   while (parts.size() > 1 && joined().size() > room) {
-    parts.erase(std::max_element(parts.begin(), parts.end(), [](const Part& a, const Part& b) { return a.rank < b.rank; }));
+    parts.erase(
+        std::max_element(parts.begin(), parts.end(), [](const Part& a, const Part& b) { return a.rank < b.rank; }));
   }
   std::string line = joined().substr(0, room);
   constexpr std::size_t kBarMin = 10, kBarMax = 40, kFrame = 4;  // "[", "]" and two spaces
@@ -74,7 +76,8 @@ std::string progress_words(const Progress& progress) {
   std::string out = progress.state.empty() ? "running" : printable(progress.state);
   out += ": ";
   if (const auto percent = percent_of(progress)) out += std::to_string(*percent) + " %, ";
-  out += std::to_string(progress.cells) + (progress.cells == 1 ? " cell, " : " cells, ") + fixed(progress.time_h, 1) + " h";
+  out += std::to_string(progress.cells) + (progress.cells == 1 ? " cell, " : " cells, ") + fixed(progress.time_h, 1) +
+         " h";
   if (progress.cells_per_s) out += ", " + rate_text(*progress.cells_per_s);
   if (progress.eta_s) out += ", about " + duration_text(*progress.eta_s) + " left";
   return out;
@@ -90,7 +93,8 @@ void ProgressPrinter::show(const Progress& progress, Clock::time_point now) {
   using std::chrono::seconds;
   const int percent = percent_of(progress).value_or(-1);
   const std::string line = progress_words(progress);
-  const bool due = !last_at_ || (percent != last_percent_ && now - *last_at_ >= seconds(1)) || now - *last_at_ >= seconds(5);
+  const bool due =
+      !last_at_ || (percent != last_percent_ && now - *last_at_ >= seconds(1)) || now - *last_at_ >= seconds(5);
   if (!due || line == last_line_) return;
   env_.out << line << std::endl;
   last_at_ = now;

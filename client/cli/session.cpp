@@ -57,8 +57,8 @@ HttpResponse Session::send_patiently(const HttpRequest& request) {
       if (!failure.transient() || last) throw;
       why = failure.what();
     }
-    env.err << "note: " << why << "; trying again in " << fixed(static_cast<double>(delay.count()) / 1000.0, 1) << " s ("
-            << attempt + 1 << " of " << env.retry.attempts_max << ")" << std::endl;
+    env.err << "note: " << why << "; trying again in " << fixed(static_cast<double>(delay.count()) / 1000.0, 1)
+            << " s (" << attempt + 1 << " of " << env.retry.attempts_max << ")" << std::endl;
     env.interrupt.wait(delay);
     if (env.interrupt.raised()) throw Failure(ExitCode::kInterrupted, "interrupted");
   }
@@ -69,7 +69,8 @@ Target job_target(const std::string& id, const std::string& rest) { return Targe
 std::string resolve_job_id(Session& session, const std::string& text) {
   std::string wanted = text;
   std::transform(wanted.begin(), wanted.end(), wanted.begin(), [](unsigned char c) { return std::tolower(c); });
-  const bool plausible = wanted.find_first_not_of("0123456789abcdef-") == std::string::npos && wanted.size() <= kIdLength;
+  const bool plausible =
+      wanted.find_first_not_of("0123456789abcdef-") == std::string::npos && wanted.size() <= kIdLength;
   if (!plausible || wanted.size() < kSuffixMin) {
     throw Failure(ExitCode::kUsage, "'" + printable(text) + "' is no job id: give a full id or at least its last " +
                                         std::to_string(kSuffixMin) + " characters (`colony list` shows them)");
@@ -79,12 +80,14 @@ std::string resolve_job_id(Session& session, const std::string& text) {
   std::vector<std::string> matches;
   std::optional<std::string> cursor;
   for (int page = 0; page < kPagesMax; ++page) {
-    const Json body = get_json(session.client(),
-                               Target("/v1/jobs").add("limit", std::to_string(kPageLimit)).add_if("cursor", cursor).text());
+    const Json body = get_json(
+        session.client(), Target("/v1/jobs").add("limit", std::to_string(kPageLimit)).add_if("cursor", cursor).text());
     const auto items = body.is_object() ? body.find("items") : body.end();
-    if (items == body.end() || !items->is_array()) throw Failure(ExitCode::kRefused, "the server's list of jobs has no items");
+    if (items == body.end() || !items->is_array())
+      throw Failure(ExitCode::kRefused, "the server's list of jobs has no items");
     for (const Json& job : *items) {
-      const std::string id = job.is_object() && job.contains("id") && job["id"].is_string() ? job["id"].get<std::string>() : "";
+      const std::string id =
+          job.is_object() && job.contains("id") && job["id"].is_string() ? job["id"].get<std::string>() : "";
       if (id.ends_with(wanted)) matches.push_back(id);
     }
     const auto next = body.find("next");
@@ -93,8 +96,10 @@ std::string resolve_job_id(Session& session, const std::string& text) {
   }
   if (matches.empty()) throw Failure(ExitCode::kRefused, "no job's id ends in '" + wanted + "'");
   if (matches.size() > 1) {
-    std::string message = "'" + wanted + "' is the end of " + std::to_string(matches.size()) + " job ids; give more of it:";
-    for (std::size_t i = 0; i < std::min<std::size_t>(matches.size(), 5); ++i) message += "\n  " + printable(matches[i]);
+    std::string message =
+        "'" + wanted + "' is the end of " + std::to_string(matches.size()) + " job ids; give more of it:";
+    for (std::size_t i = 0; i < std::min<std::size_t>(matches.size(), 5); ++i)
+      message += "\n  " + printable(matches[i]);
     if (matches.size() > 5) message += "\n  ...";
     throw Failure(ExitCode::kUsage, message);
   }

@@ -21,8 +21,8 @@ struct Session {
 
   HttpClient& client();
 
-  /// Sends again, with growing delays, after a lost connection or a 429 or 503; says so on standard error. The last answer or
-  /// failure is the caller's. Only for requests that may be repeated.
+  /// Sends again, with growing delays, after a lost connection or a 429 or 503; says so on standard error. The last
+  /// answer or failure is the caller's. Only for requests that may be repeated.
   HttpResponse send_patiently(const HttpRequest& request);
 
  private:

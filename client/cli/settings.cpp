@@ -1,12 +1,12 @@
 #include "client/cli/settings.hpp"
 
-#include <curl/curl.h>
-#include <toml++/toml.h>
-
 #include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <sstream>
+
+#include <curl/curl.h>
+#include <toml++/toml.h>
 
 #include "client/cli/failure.hpp"
 
@@ -34,7 +34,8 @@ std::string checked_server(std::string server, const std::string& where) {
   const std::string scheme = url_part(url.get(), CURLUPART_SCHEME);
   if (scheme != "http" && scheme != "https") refuse(where, "the scheme must be http or https, not '" + scheme + "'");
   for (const CURLUPart part : {CURLUPART_QUERY, CURLUPART_FRAGMENT, CURLUPART_USER, CURLUPART_PASSWORD}) {
-    if (!url_part(url.get(), part).empty()) refuse(where, "'" + server + "' must be scheme, host, port and base path only");
+    if (!url_part(url.get(), part).empty())
+      refuse(where, "'" + server + "' must be scheme, host, port and base path only");
   }
   return server;
 }

@@ -1,6 +1,6 @@
 // settings: which server, and with which token. Rising precedence: built-in default, config file, environment, flag.
-// File:   $XDG_CONFIG_HOME/colony/config.toml or ~/.config/colony/config.toml; keys `server` and `token`; unknown keys are errors.
-// Errors: Failure kUsage naming where the wrong value came from.
+// File:   $XDG_CONFIG_HOME/colony/config.toml or ~/.config/colony/config.toml; keys `server` and `token`; unknown keys
+// are errors. Errors: Failure kUsage naming where the wrong value came from.
 #pragma once
 
 #include <string>

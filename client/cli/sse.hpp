@@ -1,6 +1,7 @@
 // sse: reads a stream of server-sent events as its bytes arrive, cut anywhere.
 // Source:  WHATWG HTML, section "Server-sent events": CR, LF or CRLF; a byte order mark; comments; many data lines.
-// Errors:  Failure kRefused when one event exceeds kEventBytesMax: a stream without ends of lines must not fill the memory.
+// Errors:  Failure kRefused when one event exceeds kEventBytesMax: a stream without ends of lines must not fill the
+// memory.
 #pragma once
 
 #include <chrono>

@@ -51,8 +51,8 @@ namespace {
 
 void write_pretty(const Json& value, int indent, std::string& out) {
   const auto line = [&](int depth) { out += '\n' + std::string(static_cast<std::size_t>(depth) * 2, ' '); };
-  const bool flat =
-      value.is_array() && std::none_of(value.begin(), value.end(), [](const Json& item) { return item.is_structured(); });
+  const bool flat = value.is_array() &&
+                    std::none_of(value.begin(), value.end(), [](const Json& item) { return item.is_structured(); });
   if (!value.is_structured() || value.empty() || flat) {
     if (!flat || value.empty()) {
       out += value.dump();

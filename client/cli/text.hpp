@@ -14,13 +14,15 @@ namespace colony::client {
 /// Keeps the order of keys, so that a job spec reads as it was written.
 using Json = nlohmann::ordered_json;
 
-/// Control characters (C0, DEL, C1) become '?': names and messages come from other people, and a terminal obeys what it is sent.
+/// Control characters (C0, DEL, C1) become '?': names and messages come from other people, and a terminal obeys what it
+/// is sent.
 std::string printable(std::string_view text);
 
 /// `decimals` digits after the point, without "-0".
 std::string fixed(double value, int decimals);
 
-/// A JSON value in a table cell: strings without quotes, null as "-", other numbers than integers with `decimals` digits.
+/// A JSON value in a table cell: strings without quotes, null as "-", other numbers than integers with `decimals`
+/// digits.
 std::string cell_text(const Json& value, int decimals = 2);
 
 /// The member `name` as cell_text; "-" if the object has none.

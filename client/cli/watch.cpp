@@ -25,7 +25,8 @@ class Watch {
 
   ExitCode run() {
     try {
-      Json job = fetch_job();
+      Json job =
+          get_json(session_.client(), job_target(id_).text());  // at once or not at all; later losses are waited out
       while (!is_terminal(member_text(job, "state"))) {
         show(job);
         stream_to_end();
@@ -61,13 +62,15 @@ class Watch {
     if (event.name == "end") throw StreamEnded();
     if (event.name != "progress") return;  // bye and lagged: the connection closes, and the reconnect below follows
     const Json data = Json::parse(event.data, nullptr, false);
-    if (!data.is_object()) throw Failure(ExitCode::kRefused, "the server's stream holds a progress event that is not JSON");
+    if (!data.is_object())
+      throw Failure(ExitCode::kRefused, "the server's stream holds a progress event that is not JSON");
     if (session_.json) {
       env_.out << data.dump() << std::endl;
       return;
     }
     Progress progress = progress_from(data);
-    if (progress.state.empty()) progress.state = state_ == "queued" ? "running" : state_;  // progress is made by running jobs
+    if (progress.state.empty())
+      progress.state = state_ == "queued" ? "running" : state_;  // progress is made by running jobs
     printer_.show(progress, ProgressPrinter::Clock::now());
   }
 
@@ -108,7 +111,8 @@ class Watch {
 
   void wait_to_reconnect(const std::string& why, std::chrono::milliseconds asked) {
     if (failures_ >= env_.retry.reconnects_max) {
-      throw Failure(ExitCode::kNotReachable, why + "; gave up after " + std::to_string(failures_) + " attempts (the job may go on)");
+      throw Failure(ExitCode::kNotReachable,
+                    why + "; gave up after " + std::to_string(failures_) + " attempts (the job may go on)");
     }
     RetryPolicy policy = env_.retry;
     if (parser_.retry()) policy.first = std::min(*parser_.retry(), policy.max);
@@ -131,7 +135,8 @@ class Watch {
       env_.out << state << (reason == "-" || reason.empty() ? "" : " (" + reason + ")") << ": " << progress.cells
                << (progress.cells == 1 ? " cell" : " cells") << " at " << fixed(progress.time_h, 2) << " h, digest "
                << member_text(job, "digest") << '\n';
-      if (state == "failed" && member_text(job, "detail") != "-") env_.err << "error: " << member_text(job, "detail") << '\n';
+      if (state == "failed" && member_text(job, "detail") != "-")
+        env_.err << "error: " << member_text(job, "detail") << '\n';
     }
     if (state == "succeeded") return ExitCode::kDone;
     return state == "cancelled" ? ExitCode::kCancelled : ExitCode::kJobFailed;
