@@ -55,6 +55,11 @@ int run(const std::vector<std::string>& arguments, Environment& env) {
   } catch (const CLI::ParseError& wrong) {
     env.err << "error: " << wrong.what() << "\n  `colony --help` or `colony COMMAND --help` shows what there is\n";
     code = ExitCode::kUsage;
+  } catch (const Json::exception&) {  // a member of another type than the interface says
+    env.err
+        << "error: the server's answer is not what its interface promises (is this a colony server of this version?)"
+        << std::endl;
+    code = ExitCode::kRefused;
   } catch (const Failure& failure) {
     env.out.flush();
     env.err << "error: " << failure.what() << std::endl;

@@ -58,7 +58,7 @@ std::string spec_body(Session& session, const SubmitOptions& options) {
   }
   std::string text = options.file.empty() ? "{}" : read_input(session.env, options.file, kSpecBytesMax);
   if (assignments.empty()) return text;  // byte for byte: its mistakes are then reported at their own place
-  Json spec = parse_spec(text, options.file.empty() ? "spec" : options.file);
+  Json spec = parse_spec(text, options.file == "-" ? "standard input" : options.file);
   apply(assignments, spec);
   return spec.dump();
 }

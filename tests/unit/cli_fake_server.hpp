@@ -1,18 +1,17 @@
-// cli_fake_server: an HTTP server of a few lines on 127.0.0.1, port 0, that answers as a test says, one connection at a time.
-// It exists to send what a real server would not: cut streams, busy answers, garbage.
-// Threads: the handler runs on the server's thread; `requests()` is for after the client has its answer.
+// cli_fake_server: an HTTP server of a few lines on 127.0.0.1, port 0, that answers as a test says, one connection at a
+// time. It exists to send what a real server would not: cut streams, busy answers, garbage. Threads: the handler runs
+// on the server's thread; `requests()` is for after the client has its answer.
 #pragma once
 
 #include <arpa/inet.h>
-#include <netinet/in.h>
-#include <sys/socket.h>
-#include <unistd.h>
-
 #include <functional>
 #include <mutex>
+#include <netinet/in.h>
 #include <stdexcept>
 #include <string>
+#include <sys/socket.h>
 #include <thread>
+#include <unistd.h>
 #include <utility>
 #include <vector>
 
@@ -52,7 +51,8 @@ class FakeConnection {
   int fd_;
 };
 
-inline std::string answer(int status, const std::string& type, const std::string& body, const std::string& headers = {}) {
+inline std::string answer(int status, const std::string& type, const std::string& body,
+                          const std::string& headers = {}) {
   return "HTTP/1.1 " + std::to_string(status) + " X\r\nContent-Type: " + type + "\r\n" + headers +
          "Content-Length: " + std::to_string(body.size()) + "\r\nConnection: close\r\n\r\n" + body;
 }
@@ -62,7 +62,9 @@ inline std::string json_answer(int status, const std::string& body, const std::s
 }
 
 /// The head of an event stream that ends with the connection.
-inline std::string stream_head() { return "HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\nConnection: close\r\n\r\n"; }
+inline std::string stream_head() {
+  return "HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\nConnection: close\r\n\r\n";
+}
 
 class FakeServer {
  public:

@@ -35,7 +35,10 @@ std::string message_of(Run run, ExitCode code = ExitCode::kUsage) {
 }
 
 TEST(Csv, ReadsQuotesLineEndsAndByteOrderMark) {
-  const CsvTable table = parse_csv("\xEF\xBB\xBF" "\"time [h]\",\"a \"\"b\"\"\",c\r\n1,\"x,y\r\nz\",\r\n\r\n2,\"\",w", "t.csv", ',');
+  const CsvTable table = parse_csv(
+      "\xEF\xBB\xBF"
+      "\"time [h]\",\"a \"\"b\"\"\",c\r\n1,\"x,y\r\nz\",\r\n\r\n2,\"\",w",
+      "t.csv", ',');
   EXPECT_THAT(table.header, ElementsAre("time [h]", "a \"b\"", "c"));
   ASSERT_EQ(table.rows.size(), 2u);
   EXPECT_THAT(table.rows[0].fields, ElementsAre("1", "x,y\r\nz", ""));
@@ -80,8 +83,9 @@ TEST(Spec, SetTakesJsonElseAString) {
 TEST(Spec, FlagsWinOverTheFileAndKeepItsOrder) {
   Json spec = parse_spec(R"({"seed": 7, "model": {"cycle": {"mean_h": 12, "sd_h": 2}}, "name": "n"})", "s.json");
   apply({parse_set("model.cycle.mean_h=10"), parse_set("model.noise.phase=1"), parse_label("plate.no=7")}, spec);
-  EXPECT_EQ(spec.dump(),
-            R"({"seed":7,"model":{"cycle":{"mean_h":10,"sd_h":2},"noise":{"phase":1}},"name":"n","labels":{"plate.no":"7"}})");
+  EXPECT_EQ(
+      spec.dump(),
+      R"({"seed":7,"model":{"cycle":{"mean_h":10,"sd_h":2},"noise":{"phase":1}},"name":"n","labels":{"plate.no":"7"}})");
   EXPECT_THAT(message_of([&] { apply({parse_set("seed=1"), parse_set("seed=2")}, spec); }), HasSubstr("set twice"));
   EXPECT_THAT(message_of([&] { apply({parse_set("seed.x=1")}, spec); }), HasSubstr("'seed' is not an object"));
 }
@@ -99,9 +103,8 @@ std::vector<std::string> events_of(const std::string& stream, std::size_t piece_
   SseParser parser;
   std::vector<std::string> out;
   for (std::size_t at = 0; at < stream.size(); at += piece_bytes) {
-    parser.feed(std::string_view(stream).substr(at, piece_bytes), [&](const SseEvent& event) {
-      out.push_back(event.name + "|" + event.data + "|" + parser.last_id());
-    });
+    parser.feed(std::string_view(stream).substr(at, piece_bytes),
+                [&](const SseEvent& event) { out.push_back(event.name + "|" + event.data + "|" + parser.last_id()); });
   }
   return out;
 }
@@ -169,10 +172,12 @@ TEST(Text, SparklineRisesWithItsValues) {
 }
 
 TEST(Progress, TheBarFitsEveryWidth) {
-  const Progress progress = progress_from(
-      Json::parse(R"({"time_h": 118.25, "cells": 86, "fraction": 0.475, "cells_per_s": 210.3, "eta_s": 4, "active": 3})"));
-  EXPECT_EQ(progress_bar(progress, 80), "[################...................]  47 %  86 cells  ETA 4 s  118.2 h  210 cells/s");
-  for (int width = 0; width < 200; ++width) EXPECT_LE(progress_bar(progress, width).size(), static_cast<std::size_t>(width));
+  const Progress progress = progress_from(Json::parse(
+      R"({"time_h": 118.25, "cells": 86, "fraction": 0.475, "cells_per_s": 210.3, "eta_s": 4, "active": 3})"));
+  EXPECT_EQ(progress_bar(progress, 80),
+            "[################...................]  47 %  86 cells  ETA 4 s  118.2 h  210 cells/s");
+  for (int width = 0; width < 200; ++width)
+    EXPECT_LE(progress_bar(progress, width).size(), static_cast<std::size_t>(width));
   EXPECT_EQ(progress_bar(progress, 14), "47 %  86 cells");
   EXPECT_EQ(progress_words(progress), "running: 47 %, 86 cells, 118.2 h, 210 cells/s, about 4 s left");
 }
@@ -199,8 +204,8 @@ TEST(Founders, TakesTheEarliestTimeAndTurnsYUp) {
 }
 
 TEST(Founders, FindsColumnsByTheirUsualNames) {
-  const Founders founders =
-      select_founders(parse_csv("Position X [px],Position Y [px],Time (h),TrackID\n1,2,0,a\n", "t.csv", ','), FounderOptions());
+  const Founders founders = select_founders(
+      parse_csv("Position X [px],Position Y [px],Time (h),TrackID\n1,2,0,a\n", "t.csv", ','), FounderOptions());
   EXPECT_EQ(founders.x_column, "Position X [px]");
   EXPECT_EQ(founders.time_column, "Time (h)");
   EXPECT_EQ(founders.track_column, "TrackID");
@@ -210,7 +215,8 @@ TEST(Founders, FindsColumnsByTheirUsualNames) {
               HasSubstr("name it with --x-column; the columns are 'a', 'time', 'p', 'q'"));
   FounderOptions wrong;
   wrong.y_column = "why";
-  EXPECT_THAT(message_of([&] { select_founders(tracks("1,0,1,2\n"), wrong); }), HasSubstr("--y-column: no column 'why'"));
+  EXPECT_THAT(message_of([&] { select_founders(tracks("1,0,1,2\n"), wrong); }),
+              HasSubstr("--y-column: no column 'why'"));
 }
 
 TEST(Founders, NamesTheLineOfABadRow) {
@@ -219,7 +225,8 @@ TEST(Founders, NamesTheLineOfABadRow) {
   };
   EXPECT_THAT(error("1,0,1,2\n2,0,NaN,2\n"), HasSubstr("t.csv:3: column 'Y': 'NaN' is not a finite number"));
   EXPECT_THAT(error("1,0,1,2\n2,zero,3,2\n"), HasSubstr("t.csv:3: column 'time': 'zero'"));
-  EXPECT_THAT(error("1,0,1,2\n1,0,3,4\n"), HasSubstr("t.csv:3: column 'track': '1' stands for the same time in line 2"));
+  EXPECT_THAT(error("1,0,1,2\n1,0,3,4\n"),
+              HasSubstr("t.csv:3: column 'track': '1' stands for the same time in line 2"));
   EXPECT_THAT(error("1,0,1,2\n2,0,1,2\n"), HasSubstr("t.csv:3: the same position as in line 2"));
   EXPECT_THAT(error(""), HasSubstr("no rows"));
   FounderOptions later;
@@ -256,7 +263,8 @@ TEST(Founders, ClosestPairIsThatOfBruteForce) {
     double best_um = 1e300;
     for (std::size_t a = 0; a < founders.size(); ++a) {
       for (std::size_t b = a + 1; b < founders.size(); ++b) {
-        best_um = std::min(best_um, std::hypot(founders[a].x_um - founders[b].x_um, founders[a].y_um - founders[b].y_um));
+        best_um =
+            std::min(best_um, std::hypot(founders[a].x_um - founders[b].x_um, founders[a].y_um - founders[b].y_um));
       }
     }
     ASSERT_EQ(closest_pair(founders)->distance_um, best_um) << founders.size();

@@ -1,12 +1,12 @@
-// The command line as its user meets it: arguments in; output, messages and exit code out, against a server that misbehaves on demand.
-#include <unistd.h>
-
+// The command line as its user meets it: arguments in; output, messages and exit code out, against a server that
+// misbehaves on demand.
 #include <atomic>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <sstream>
 #include <string>
+#include <unistd.h>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -131,21 +131,24 @@ TEST_F(Cli, SettingsRiseFromFileToEnvironmentToFlag) {
 
 TEST_F(Cli, ProblemsNameTheField) {
   FakeServer server([](const FakeRequest&, const FakeConnection& to) {
-    to.send(json_answer(422, R"({"type":"urn:colony:problem:invalid","title":"The spec is wrong","status":422,"detail":"2 errors",
+    to.send(json_answer(
+        422, R"({"type":"urn:colony:problem:invalid","title":"The spec is wrong","status":422,"detail":"2 errors",
       "request_id":"r-9","errors":[{"pointer":"/model/cycle/mean_h","message":"must be within 3 to 200"},
       {"parameter":"at_h\u001b[2J","message":"is not a number"},{"pointer":"","message":"no bound"}]})"));
   });
   use(server);
   EXPECT_EQ(run({"submit", "--preset", "paper"}), 4);
   EXPECT_EQ(err(),
-            "error: The spec is wrong: 2 errors\n  /model/cycle/mean_h: must be within 3 to 200\n  at_h?[2J: is not a number\n"
+            "error: The spec is wrong: 2 errors\n  /model/cycle/mean_h: must be within 3 to 200\n  at_h?[2J: is not a "
+            "number\n"
             "  (whole document): no bound\n  request id: r-9\n");
   EXPECT_EQ(out(), "");
   EXPECT_EQ(server.requests().size(), 1u);  // a refusal is not asked again
 }
 
 TEST_F(Cli, AnAnswerThatIsNoProblemIsQuoted) {
-  FakeServer server([](const FakeRequest&, const FakeConnection& to) { to.send(test::answer(502, "text/html", "<b>proxy</b>")); });
+  FakeServer server(
+      [](const FakeRequest&, const FakeConnection& to) { to.send(test::answer(502, "text/html", "<b>proxy</b>")); });
   use(server);
   EXPECT_EQ(run({"info"}), 4);
   EXPECT_EQ(err(), "error: HTTP 502 from the server: <b>proxy</b>\n");
@@ -161,11 +164,12 @@ TEST_F(Cli, RedirectsAreNotFollowed) {
 }
 
 TEST_F(Cli, SubmitMergesFileAndFlags) {
-  FakeServer server([](const FakeRequest&, const FakeConnection& to) { to.send(json_answer(201, job_json("queued"))); });
+  FakeServer server(
+      [](const FakeRequest&, const FakeConnection& to) { to.send(json_answer(201, job_json("queued"))); });
   use(server);
   in_ = R"({"seed": 3, "until": {"cells": 5}})";
-  EXPECT_EQ(run({"submit", "-", "--seed", "-1", "--until-time", "42.5", "--label", "plate=7", "--set", "model.cell.pair_volume_um3=[800,3600]",
-                 "--set", "model.cycle.mean_h=10"}),
+  EXPECT_EQ(run({"submit", "-", "--seed", "-1", "--until-time", "42.5", "--label", "plate=7", "--set",
+                 "model.cell.pair_volume_um3=[800,3600]", "--set", "model.cycle.mean_h=10"}),
             0);
   EXPECT_EQ(out(), "submitted: " + kId + " (queued)\n");
   const FakeRequest request = server.requests().at(0);
@@ -178,7 +182,7 @@ TEST_F(Cli, SubmitMergesFileAndFlags) {
   EXPECT_EQ(out(), kId + "\n");
   EXPECT_EQ(server.requests().at(1).body, in_);
   EXPECT_EQ(run({"submit", "-", "--name", "x"}), 2);
-  EXPECT_THAT(err(), HasSubstr("standard input") );
+  EXPECT_THAT(err(), HasSubstr("standard input"));
 }
 
 TEST_F(Cli, SubmitKeepsItsKeyWhenItTriesAgain) {
@@ -217,7 +221,8 @@ TEST_F(Cli, SubmitGivesUpAfterItsAttempts) {
 }
 
 TEST_F(Cli, DryRunStoresNothingAndPrintsTheSpec) {
-  FakeServer server([](const FakeRequest&, const FakeConnection& to) { to.send(json_answer(200, R"({"spec":{"range":[1,2]}})")); });
+  FakeServer server(
+      [](const FakeRequest&, const FakeConnection& to) { to.send(json_answer(200, R"({"spec":{"range":[1,2]}})")); });
   use(server);
   EXPECT_EQ(run({"submit", "--preset", "paper", "--dry-run"}), 0);
   EXPECT_EQ(out(), "{\n  \"spec\": {\n    \"range\": [1, 2]\n  }\n}\n");
@@ -228,7 +233,8 @@ TEST_F(Cli, SuffixesAreResolvedThroughAllPages) {
   FakeServer server([](const FakeRequest& request, const FakeConnection& to) {
     const std::string first = "0190aaaa-bbbb-7ccc-8ddd-00000000ffff", last = "0190aaaa-bbbb-7ccc-8ddd-0000aaaaffff";
     if (request.line().find("cursor=c%2B1") != std::string::npos) {
-      return to.send(json_answer(200, R"({"items":[)" + job_json("queued") + "," + job_json("queued", last) + R"(],"next":null})"));
+      return to.send(json_answer(
+          200, R"({"items":[)" + job_json("queued") + "," + job_json("queued", last) + R"(],"next":null})"));
     }
     if (request.line().find("GET /v1/jobs?") == 0) {
       return to.send(json_answer(200, R"({"items":[)" + job_json("queued", first) + R"(],"next":"c+1"})"));
@@ -254,7 +260,8 @@ TEST_F(Cli, SuffixesAreResolvedThroughAllPages) {
 
 TEST_F(Cli, CommandsSayWhetherAnythingChanged) {
   std::atomic<int> status{202};
-  FakeServer server([&](const FakeRequest&, const FakeConnection& to) { to.send(json_answer(status, job_json("cancelled"))); });
+  FakeServer server(
+      [&](const FakeRequest&, const FakeConnection& to) { to.send(json_answer(status, job_json("cancelled"))); });
   use(server);
   EXPECT_EQ(run({"cancel", kId}), 0);
   EXPECT_EQ(out(), kId + ": cancelled (cells)\n");
@@ -268,7 +275,8 @@ TEST_F(Cli, CommandsSayWhetherAnythingChanged) {
   EXPECT_EQ(server.requests().back().line(), "DELETE /v1/jobs/" + kId + " HTTP/1.1");
 }
 
-/// A server whose job is `running` for its first answer and `state` afterwards, with `stream` answering each event stream.
+/// A server whose job is `running` for its first answer and `state` afterwards, with `stream` answering each event
+/// stream.
 class WatchedJob {
  public:
   using Stream = std::function<void(int, const FakeConnection&)>;
@@ -284,7 +292,8 @@ class WatchedJob {
   FakeServer server_;
 };
 
-const std::string kProgress = "event: progress\ndata: {\"time_h\":10.5,\"cells\":7,\"fraction\":0.04,\"cells_per_s\":90.0,\"eta_s\":2}\n\n";
+const std::string kProgress =
+    "event: progress\ndata: {\"time_h\":10.5,\"cells\":7,\"fraction\":0.04,\"cells_per_s\":90.0,\"eta_s\":2}\n\n";
 
 TEST_F(Cli, WatchEndsAsTheJobDoes) {
   for (const auto& [state, code] : std::map<std::string, int>{{"succeeded", 0}, {"failed", 1}, {"cancelled", 5}}) {
@@ -361,7 +370,8 @@ const std::string kLines =
     "\"cells\":[{},{\"cell_id\":2,\"x_um\":3.0,\"y_um\":4.0}]}\n";
 
 TEST_F(Cli, EventsInEveryForm) {
-  FakeServer server([](const FakeRequest&, const FakeConnection& to) { to.send(test::answer(200, "application/x-ndjson", kLines)); });
+  FakeServer server(
+      [](const FakeRequest&, const FakeConnection& to) { to.send(test::answer(200, "application/x-ndjson", kLines)); });
   use(server);
   EXPECT_EQ(run({"events", kId, "--kind", "founded,divided", "--after", "0"}), 0);
   EXPECT_THAT(out(), HasSubstr("11.250  divided          1  daughter 2 at (3.0, 4.0) um  fitness 0.988\n"));
@@ -403,9 +413,11 @@ TEST_F(Cli, AFileIsWholeOrNotThere) {
 TEST_F(Cli, FollowGoesOnAfterTheLastEventItWrote) {
   FakeServer server([](const FakeRequest& request, const FakeConnection& to) {
     if (request.header("Last-Event-ID").empty()) {
-      return to.send(stream_head() + "retry: 1\n\nevent: founded\nid: 1\ndata: {\"seq\":1}\n\nevent: divided\nid: 2\ndata: {\"se");
+      return to.send(stream_head() +
+                     "retry: 1\n\nevent: founded\nid: 1\ndata: {\"seq\":1}\n\nevent: divided\nid: 2\ndata: {\"se");
     }
-    to.send(stream_head() + "event: divided\nid: 2\ndata: {\"seq\":2}\n\nevent: end\nid: 2\ndata: {\"state\":\"failed\"}\n\n");
+    to.send(stream_head() +
+            "event: divided\nid: 2\ndata: {\"seq\":2}\n\nevent: end\nid: 2\ndata: {\"state\":\"failed\"}\n\n");
   });
   use(server);
   EXPECT_EQ(run({"events", kId, "--follow", "--ndjson"}), 0);
@@ -416,7 +428,8 @@ TEST_F(Cli, FollowGoesOnAfterTheLastEventItWrote) {
 
 TEST_F(Cli, SeriesForPeople) {
   FakeServer server([](const FakeRequest&, const FakeConnection& to) {
-    to.send(json_answer(200, R"({"items":[{"time_h":0.0,"cell_count":1},{"time_h":50.0,"cell_count":14}],"next":null})"));
+    to.send(
+        json_answer(200, R"({"items":[{"time_h":0.0,"cell_count":1},{"time_h":50.0,"cell_count":14}],"next":null})"));
   });
   use(server);
   EXPECT_EQ(run({"series", kId}), 0);
@@ -427,8 +440,8 @@ TEST_F(Cli, SeriesForPeople) {
 
 TEST_F(Cli, FoundersMakeASpec) {
   write_file("t.csv", "track;time;Y;X\r\n1;0;10;20\r\n2;0;30;60\r\n");
-  EXPECT_EQ(run({"founders", path("t.csv"), "--um-per-px", "2", "--until-time", "42", "--seed", "5", "--dish-radius-um", "auto",
-                 "-o", path("spec.json")}),
+  EXPECT_EQ(run({"founders", path("t.csv"), "--um-per-px", "2", "--until-time", "42", "--seed", "5", "--dish-radius-um",
+                 "auto", "-o", path("spec.json")}),
             0);
   const auto spec = nlohmann::json::parse(read_file("spec.json"));
   EXPECT_EQ(spec["preset"], "clonogenic");
