@@ -175,7 +175,7 @@ TEST(Progress, TheBarFitsEveryWidth) {
   const Progress progress = progress_from(Json::parse(
       R"({"time_h": 118.25, "cells": 86, "fraction": 0.475, "cells_per_s": 210.3, "eta_s": 4, "active": 3})"));
   EXPECT_EQ(progress_bar(progress, 80),
-            "[################...................]  47 %  86 cells  ETA 4 s  118.2 h  210 cells/s");
+            "[##############.................]  47 %  86 cells  ETA 4 s  118.2 h  210 cells/s");
   for (int width = 0; width < 200; ++width)
     EXPECT_LE(progress_bar(progress, width).size(), static_cast<std::size_t>(width));
   EXPECT_EQ(progress_bar(progress, 14), "47 %  86 cells");

@@ -348,7 +348,7 @@ TEST_F(Cli, WatchDrawsABarOnATerminal) {
   });
   use(job.server());
   EXPECT_EQ(run({"watch", kId}), 0);
-  EXPECT_THAT(out(), HasSubstr("\r[..........]  4 %  7 cells  ETA 2 s  10.5 h  90 cells/s\x1b[K"));
+  EXPECT_THAT(out(), HasSubstr("\r[..............]  4 %  7 cells  ETA 2 s  10.5 h  90 cells/s\x1b[K"));
 }
 
 TEST_F(Cli, SubmitAndWatchAsJsonLines) {
