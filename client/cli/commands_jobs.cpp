@@ -23,7 +23,8 @@ std::string progress_member(const Json& job, const char* name, int decimals) {
 
 std::string state_text(const Json& job) {
   const std::string reason = member_text(job, "reason");
-  return member_text(job, "state") + (reason.empty() || reason == "-" ? "" : " (" + reason + ")");
+  const std::string state = member_text(job, "state");
+  return reason.empty() || reason == "-" || reason == state ? state : state + " (" + reason + ")";
 }
 
 void print_raw(Session& session, const std::string& body) {
@@ -69,12 +70,21 @@ ExitCode list_jobs(Session& session, const ListOptions& options) {
   return ExitCode::kDone;
 }
 
-/// Members one below the other; objects inside objects by their path, long texts whole.
+/// Members one below the other; objects inside objects by their path. A list of objects is given by their names alone,
+/// or their number: `--json` has the rest.
 void print_members(std::ostream& out, const Json& object, const std::string& prefix) {
   for (const auto& [key, value] : object.items()) {
     const std::string name = prefix + printable(key);
     if (value.is_object() && !value.empty()) {
       print_members(out, value, name + ".");
+    } else if (value.is_array() && !value.empty() && value.front().is_object()) {
+      out << name << ": ";
+      if (value.front().contains("name")) {
+        for (std::size_t i = 0; i < value.size(); ++i) out << (i > 0 ? ", " : "") << member_text(value[i], "name");
+      } else {
+        out << value.size() << " (--json shows them)";
+      }
+      out << '\n';
     } else {
       out << name << ": " << (value.is_number_float() ? value.dump() : cell_text(value)) << '\n';
     }

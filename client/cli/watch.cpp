@@ -132,9 +132,9 @@ class Watch {
     } else {
       const Progress progress = progress_from(job.value("progress", Json()));
       const std::string reason = member_text(job, "reason");
-      env_.out << state << (reason == "-" || reason.empty() ? "" : " (" + reason + ")") << ": " << progress.cells
-               << (progress.cells == 1 ? " cell" : " cells") << " at " << fixed(progress.time_h, 2) << " h, digest "
-               << member_text(job, "digest") << '\n';
+      env_.out << state << (reason == "-" || reason.empty() || reason == state ? "" : " (" + reason + ")") << ": "
+               << progress.cells << (progress.cells == 1 ? " cell" : " cells") << " at " << fixed(progress.time_h, 2)
+               << " h, digest " << member_text(job, "digest") << '\n';
       if (state == "failed" && member_text(job, "detail") != "-")
         env_.err << "error: " << member_text(job, "detail") << '\n';
     }
