@@ -1,21 +1,16 @@
 // The command line as its user meets it: arguments in; output, messages and exit code out, against a server that
 // misbehaves on demand.
 #include <atomic>
-#include <filesystem>
-#include <fstream>
 #include <map>
 #include <sstream>
 #include <string>
-#include <unistd.h>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "client/cli/app.hpp"
-#include "client/cli/environment.hpp"
-#include "tests/unit/cli_fake_server.hpp"
+#include "tests/unit/cli_fixture.hpp"
 
 namespace colony::client {
 namespace {
@@ -24,66 +19,9 @@ using test::FakeConnection;
 using test::FakeRequest;
 using test::FakeServer;
 using test::json_answer;
-using test::stream_head;
 using testing::ElementsAre;
 using testing::HasSubstr;
-using testing::Not;
 using testing::StartsWith;
-
-const std::string kId = "0190aaaa-bbbb-7ccc-8ddd-000000001234";
-
-class Cli : public testing::Test {
- protected:
-  void SetUp() override {
-    std::string pattern = (std::filesystem::temp_directory_path() / "colony_cli_XXXXXX").string();
-    ASSERT_NE(::mkdtemp(pattern.data()), nullptr);
-    folder_ = pattern;
-    variables_["HOME"] = folder_.string();
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-
-  int run(const std::vector<std::string>& arguments) {
-    out_.str("");
-    err_.str("");
-    std::istringstream in(in_);
-    const auto variable = [this](const std::string& name) -> std::optional<std::string> {
-      const auto found = variables_.find(name);
-      return found == variables_.end() ? std::nullopt : std::optional(found->second);
-    };
-    Environment env{in, out_, err_, interrupt_, variable};
-    env.out_is_terminal = out_is_terminal_;
-    env.terminal_width = [] { return 60; };
-    env.retry = {3, 3, std::chrono::milliseconds(1), std::chrono::milliseconds(2000)};
-    return client::run(arguments, env);
-  }
-  void use(const FakeServer& server) { variables_["COLONY_SERVER"] = server.url(); }
-  std::string out() const { return out_.str(); }
-  std::string err() const { return err_.str(); }
-  std::string path(const std::string& name) const { return (folder_ / name).string(); }
-  void write_file(const std::string& name, const std::string& text) const {
-    std::filesystem::create_directories((folder_ / name).parent_path());
-    std::ofstream(folder_ / name, std::ios::binary) << text;
-  }
-  std::string read_file(const std::string& name) const {
-    std::ifstream file(folder_ / name, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-  }
-  std::size_t file_count() const {
-    return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator(folder_), {}));
-  }
-
-  std::filesystem::path folder_;
-  std::map<std::string, std::string> variables_;
-  std::string in_;
-  bool out_is_terminal_ = false;
-  Interrupt interrupt_;
-  std::ostringstream out_, err_;
-};
-
-std::string job_json(const std::string& state, const std::string& id = kId) {
-  return R"({"id":")" + id + R"(","state":")" + state +
-         R"(","reason":"cells","detail":null,"name":"n","digest":"abc123","progress":{"cells":180,"time_h":172.3,"fraction":1.0}})";
-}
 
 /// A port where nobody listens any more.
 std::string closed_server() {
@@ -275,95 +213,6 @@ TEST_F(Cli, CommandsSayWhetherAnythingChanged) {
   EXPECT_EQ(server.requests().back().line(), "DELETE /v1/jobs/" + kId + " HTTP/1.1");
 }
 
-/// A server whose job is `running` for its first answer and `state` afterwards, with `stream` answering each event
-/// stream.
-class WatchedJob {
- public:
-  using Stream = std::function<void(int, const FakeConnection&)>;
-  WatchedJob(std::string state, Stream stream)
-      : server_([this, state, stream](const FakeRequest& request, const FakeConnection& to) {
-          if (request.line().find("/events") != std::string::npos) return stream(stream_count_++, to);
-          to.send(json_answer(200, job_json(job_count_++ == 0 ? "running" : state)));
-        }) {}
-  const FakeServer& server() const { return server_; }
-
- private:
-  int stream_count_ = 0, job_count_ = 0;  // of the server's thread
-  FakeServer server_;
-};
-
-const std::string kProgress =
-    "event: progress\ndata: {\"time_h\":10.5,\"cells\":7,\"fraction\":0.04,\"cells_per_s\":90.0,\"eta_s\":2}\n\n";
-
-TEST_F(Cli, WatchEndsAsTheJobDoes) {
-  for (const auto& [state, code] : std::map<std::string, int>{{"succeeded", 0}, {"failed", 1}, {"cancelled", 5}}) {
-    WatchedJob job(state, [](int, const FakeConnection& to) {
-      to.send(stream_head() + "retry: 1\n\n" + kProgress + "event: end\nid: 400\ndata: {}\n\n");
-      to.wait_for_close();  // a proxy may keep the connection: `end` alone must do
-    });
-    use(job.server());
-    EXPECT_EQ(run({"watch", kId}), code);
-    EXPECT_THAT(out(), StartsWith("running: 100 %, 180 cells, 172.3 h\n"));  // the job as it was found
-    EXPECT_THAT(out(), testing::EndsWith(state + " (cells): 180 cells at 172.30 h, digest abc123\n"));
-    EXPECT_EQ(job.server().requests().at(1).header("Accept"), "text/event-stream");
-  }
-}
-
-TEST_F(Cli, WatchConnectsAgainAndMissesNothing) {
-  WatchedJob job("succeeded", [](int index, const FakeConnection& to) {
-    if (index == 0) return to.send(stream_head() + "retry: 1\n\nid: 17\n" + kProgress + "event: bye\ndata: {}\n\n");
-    if (index == 1) return to.send(json_answer(503, "{}", "Retry-After: 0\r\n"));
-    if (index == 2) return;  // closed without a word
-    to.send("HTTP/1.1 204 No Content\r\nConnection: close\r\n\r\n");
-  });
-  use(job.server());
-  EXPECT_EQ(run({"watch", kId}), 0);
-  EXPECT_THAT(err(), HasSubstr("connecting again"));
-  EXPECT_EQ(job.server().requests().at(2).header("Last-Event-ID"), "17");
-}
-
-TEST_F(Cli, WatchGivesUpOnAServerThatStaysAway) {
-  WatchedJob job("succeeded", [](int, const FakeConnection&) {});
-  use(job.server());
-  EXPECT_EQ(run({"watch", kId}), 3);
-  EXPECT_THAT(err(), HasSubstr("gave up after 3 attempts"));
-}
-
-TEST_F(Cli, CtrlCLeavesTheJobRunning) {
-  WatchedJob job("succeeded", [this](int, const FakeConnection& to) {
-    to.send(stream_head() + kProgress);
-    interrupt_.raise();
-    to.wait_for_close();
-  });
-  use(job.server());
-  EXPECT_EQ(run({"watch", kId}), 130);
-  EXPECT_THAT(err(), HasSubstr("the job goes on"));
-  for (const FakeRequest& request : job.server().requests()) EXPECT_THAT(request.line(), StartsWith("GET "));
-}
-
-TEST_F(Cli, WatchDrawsABarOnATerminal) {
-  out_is_terminal_ = true;
-  WatchedJob job("succeeded", [](int, const FakeConnection& to) {
-    to.send(stream_head() + kProgress + "event: end\ndata: {}\n\n");
-  });
-  use(job.server());
-  EXPECT_EQ(run({"watch", kId}), 0);
-  EXPECT_THAT(out(), HasSubstr("\r[..............]  4 %  7 cells  ETA 2 s  10.5 h  90 cells/s\x1b[K"));
-}
-
-TEST_F(Cli, SubmitAndWatchAsJsonLines) {
-  WatchedJob job("succeeded", [](int, const FakeConnection& to) {
-    to.send(stream_head() + kProgress + "event: end\ndata: {}\n\n");
-  });
-  use(job.server());
-  EXPECT_EQ(run({"submit", "--preset", "paper", "--watch", "--json"}), 0);
-  std::istringstream lines(out());
-  std::string line;
-  int count = 0;
-  for (; std::getline(lines, line); ++count) EXPECT_TRUE(nlohmann::json::accept(line)) << line;
-  EXPECT_EQ(count, 2);  // the job was submitted (its first answer), had ended by the next look, so: the job, the job
-}
-
 const std::string kLines =
     "{\"seq\":1,\"time_h\":0.0,\"kind\":\"founded\",\"cell_id\":1,\"cell\":{\"x_um\":0.5,\"y_um\":-1.0}}\n"
     "{\"seq\":2,\"time_h\":11.25,\"kind\":\"divided\",\"cell_id\":1,\"fitness\":0.987654,"
@@ -408,22 +257,6 @@ TEST_F(Cli, AFileIsWholeOrNotThere) {
             "GET /v1/jobs/" + kId + "/image?at_h=110.5&style=contours&scale_bar=false HTTP/1.1");
   EXPECT_EQ(run({"image", kId, "-o", path("absent/c.png")}), 2);
   EXPECT_THAT(err(), HasSubstr("cannot create a file there"));
-}
-
-TEST_F(Cli, FollowGoesOnAfterTheLastEventItWrote) {
-  FakeServer server([](const FakeRequest& request, const FakeConnection& to) {
-    if (request.header("Last-Event-ID").empty()) {
-      return to.send(stream_head() +
-                     "retry: 1\n\nevent: founded\nid: 1\ndata: {\"seq\":1}\n\nevent: divided\nid: 2\ndata: {\"se");
-    }
-    to.send(stream_head() +
-            "event: divided\nid: 2\ndata: {\"seq\":2}\n\nevent: end\nid: 2\ndata: {\"state\":\"failed\"}\n\n");
-  });
-  use(server);
-  EXPECT_EQ(run({"events", kId, "--follow", "--ndjson"}), 0);
-  EXPECT_EQ(out(), "{\"seq\":1}\n{\"seq\":2}\n");
-  EXPECT_EQ(server.requests().at(1).header("Last-Event-ID"), "1");
-  EXPECT_THAT(err(), HasSubstr("the job has ended: failed"));
 }
 
 TEST_F(Cli, SeriesForPeople) {
