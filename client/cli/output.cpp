@@ -56,7 +56,7 @@ Output::~Output() {
 void Output::write(std::string_view bytes) {
   written_bytes_ += bytes.size();
   if (fd_ < 0) {
-    errno = 0;
+    if (env_.out.good()) errno = 0;
     if (path_.empty() && !env_.out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()))) fail_out();
     return;
   }
@@ -83,7 +83,7 @@ void Output::fail(const std::string& what) const {
 }
 
 void flush_out(Environment& env) {
-  errno = 0;
+  if (env.out.good()) errno = 0;  // else it tells why the write just before failed
   if (!env.out.flush()) fail_out();
 }
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "client/cli/output.hpp"
+
 namespace colony::client {
 namespace {
 
@@ -86,7 +88,8 @@ std::string progress_words(const Progress& progress) {
 void ProgressPrinter::show(const Progress& progress, Clock::time_point now) {
   if (env_.out_is_terminal) {
     // One column stays free: a full line makes some terminals wrap.
-    env_.out << '\r' << progress_bar(progress, env_.terminal_width() - 1) << "\x1b[K" << std::flush;
+    env_.out << '\r' << progress_bar(progress, env_.terminal_width() - 1) << "\x1b[K";
+    flush_out(env_);
     drawn_ = true;
     return;
   }
@@ -96,7 +99,8 @@ void ProgressPrinter::show(const Progress& progress, Clock::time_point now) {
   const bool due =
       !last_at_ || (percent != last_percent_ && now - *last_at_ >= seconds(1)) || now - *last_at_ >= seconds(5);
   if (!due || line == last_line_) return;
-  env_.out << line << std::endl;
+  env_.out << line << '\n';
+  flush_out(env_);
   last_at_ = now;
   last_percent_ = percent;
   last_line_ = line;

@@ -65,7 +65,8 @@ class Watch {
     if (!data.is_object())
       throw Failure(ExitCode::kRefused, "the server's stream holds a progress event that is not JSON");
     if (session_.json) {
-      env_.out << data.dump() << std::endl;
+      env_.out << data.dump() << '\n';
+      flush_out(env_);
       return;
     }
     Progress progress = progress_from(data);
