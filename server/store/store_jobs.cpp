@@ -174,7 +174,9 @@ Result<JobRow> SqliteStore::set_state(std::int64_t job_key, const std::vector<Jo
     const bool expected = std::find(from.begin(), from.end(), job->state) != from.end();
     if (!expected || !may_follow(job->state, to) || is_terminal(to)) return wrong_state(*job);
     if (job->command == "cancel") return Error{ErrorCode::kConflict, "the job is being cancelled"};
-    change_state(connection, *job, to, reason, detail);
+    // A pause asked for stands, also when the disk stopped the job first: else it would go on by itself.
+    const bool wished = to == JobState::kPaused && job->command == "pause";
+    change_state(connection, *job, to, wished ? "user" : reason, detail);
     return std::move(*job);
   });
 }
