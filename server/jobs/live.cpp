@@ -7,7 +7,7 @@ namespace colony::server {
 namespace {
 
 constexpr std::chrono::milliseconds kSampleEvery{200};
-constexpr std::size_t kSamplesMax = 50;                    // 10 s: long enough for one slow search, short enough to follow
+constexpr std::size_t kSamplesMax = 50;  // 10 s: long enough for one slow search, short enough to follow
 
 std::optional<double> fraction_of(double time_h, std::uint64_t cells, const std::optional<double>& until_time_h,
                                   const std::optional<std::uint64_t>& until_cells) {
@@ -38,7 +38,7 @@ class Hub::Entry : public JobService::Subscription {
   void wake() const { wake_(); }
 
  private:
-  const std::shared_ptr<Hub> hub_;                         // a subscription may outlive the service
+  const std::shared_ptr<Hub> hub_;  // a subscription may outlive the service
   const std::int64_t job_key_;
   const std::function<void()> wake_;
 };
@@ -93,7 +93,7 @@ Progress LiveJob::progress() const {
   if (samples_.empty()) return progress;
   // Up to now, not up to the last commit: a rate must fall while nothing happens.
   const double seconds = std::chrono::duration<double>(Clock::now() - samples_.front().at).count();
-  if (seconds <= 0.2) return progress;                     // too short to say anything
+  if (seconds <= 0.2) return progress;  // too short to say anything
   const Sample& first = samples_.front();
   progress.cells_per_s = (static_cast<double>(last_.cells) - static_cast<double>(first.cells)) / seconds;
   if (last_.fraction && *last_.fraction > first.fraction) {

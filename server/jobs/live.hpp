@@ -27,7 +27,7 @@ class Hub : public std::enable_shared_from_this<Hub> {
  private:
   class Entry;
   // Held while wake functions run: a subscription that is gone is never called. So they must not come back here.
-  std::mutex mutex_;                                       // guards everything below
+  std::mutex mutex_;  // guards everything below
   std::map<std::int64_t, std::set<Entry*>> watchers_;
 };
 
@@ -48,15 +48,19 @@ class LiveJob {
 
  private:
   using Clock = std::chrono::steady_clock;
-  struct Sample { Clock::time_point at; std::uint64_t cells; double fraction; };
+  struct Sample {
+    Clock::time_point at;
+    std::uint64_t cells;
+    double fraction;
+  };
 
   std::atomic<Wish> wish_{Wish::kNone};
   std::atomic<bool> has_committed_{false};
-  const std::optional<double> until_time_h_;               // fixed after construction
+  const std::optional<double> until_time_h_;  // fixed after construction
   const std::optional<std::uint64_t> until_cells_;
-  mutable std::mutex mutex_;                               // guards everything below
-  Progress last_;                                          // without rates
-  std::deque<Sample> samples_;                             // of the last seconds, at most kSamplesMax
+  mutable std::mutex mutex_;    // guards everything below
+  Progress last_;               // without rates
+  std::deque<Sample> samples_;  // of the last seconds, at most kSamplesMax
 };
 
 /// Progress as the row alone tells it (no rates).

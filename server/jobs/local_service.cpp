@@ -67,7 +67,7 @@ Result<JobService::Commanded> LocalJobService::command(const std::string& id, Jo
   const auto job = store_.find_job(id);
   if (!job) return job.error();
   const std::int64_t job_key = job->job_key;
-  auto commanded = store_.command_job(job_key, what);      // durable from here on, whatever becomes of the notification
+  auto commanded = store_.command_job(job_key, what);  // durable from here on, whatever becomes of the notification
   if (!commanded) return commanded.error();
   bool changed = commanded->changed;
   if (commanded->pending) {
@@ -120,7 +120,8 @@ Status LocalJobService::remove(const std::string& id) {
   return Ok{};
 }
 
-Result<std::vector<Event>> LocalJobService::events(const std::string& id, const EventFilter& filter, std::size_t limit) {
+Result<std::vector<Event>> LocalJobService::events(const std::string& id, const EventFilter& filter,
+                                                   std::size_t limit) {
   const auto job = store_.find_job(id);
   if (!job) return job.error();
   return store_.read_events(job->job_key, filter, limit);
@@ -140,7 +141,8 @@ Result<ColonyAt> LocalJobService::colony_at(const std::string& id, std::optional
     return Error{ErrorCode::kInvalid, "at_h is out of range", {{"at_h", "must be a finite number, 0 or more"}}};
   }
   if (!is_terminal(job->state) && *at_h > job->time_h) {
-    return Error{ErrorCode::kNotReached, "the job has not reached this time",
+    return Error{ErrorCode::kNotReached,
+                 "the job has not reached this time",
                  {{"at_h", "the job is at " + std::to_string(job->time_h) + " h"}}};
   }
   std::uint64_t seq = job->last_seq;
@@ -156,7 +158,8 @@ Result<ColonyAt> LocalJobService::colony_at(const std::string& id, std::optional
 
 Result<std::vector<SeriesRow>> LocalJobService::series(const std::string& id, std::size_t points) {
   if (points < 1 || points > kSeriesPointsMax) {
-    return Error{ErrorCode::kInvalid, "points is out of range",
+    return Error{ErrorCode::kInvalid,
+                 "points is out of range",
                  {{"points", "must lie in 1.." + std::to_string(kSeriesPointsMax)}}};
   }
   const auto job = store_.find_job(id);

@@ -47,7 +47,10 @@ class LocalJobService final : public JobService {
 
  private:
   using Clock = std::chrono::steady_clock;
-  struct Stalled { std::chrono::milliseconds pause{0}; Clock::time_point retry_at; };
+  struct Stalled {
+    std::chrono::milliseconds pause{0};
+    Clock::time_point retry_at;
+  };
 
   void run_loop();
   /// The next job with its live half, registered; nullptr in `second` if there is none.
@@ -62,23 +65,24 @@ class LocalJobService final : public JobService {
   /// Waits until no runner holds the job; false after command_wait_ms or when draining.
   bool wait_until_left(std::int64_t job_key);
 
-  Store& store_;                                           // fixed after construction
+  Store& store_;  // fixed after construction
   const JobsConfig config_;
   const SpecDecoder decode_;
-  const std::shared_ptr<Hub> hub_ = std::make_shared<Hub>();   // synchronises itself
-  Past past_;                                              // synchronises itself
+  const std::shared_ptr<Hub> hub_ = std::make_shared<Hub>();  // synchronises itself
+  Past past_;                                                 // synchronises itself
   const RunnerEnvironment environment_;
 
   // Held from taking a job to registering it: a command that finds a job running then finds its live half too.
-  std::mutex take_mutex_;                                  // before mutex_ where both are held
-  std::mutex mutex_;                                       // guards everything below
-  std::condition_variable changed_;                        // work came, a runner left a job, or draining began
+  std::mutex take_mutex_;            // before mutex_ where both are held
+  std::mutex mutex_;                 // guards everything below
+  std::condition_variable changed_;  // work came, a runner left a job, or draining began
   bool draining_ = false;
   std::uint64_t nudges_ = 0;                               // grows whenever a queued job may have come
   std::deque<JobRow> running_before_;                      // `running` in the store, without a runner
   std::map<std::int64_t, std::shared_ptr<LiveJob>> live_;  // at most concurrent_max
   std::map<std::int64_t, Stalled> stalled_;                // stopped by the store
-  std::map<std::int64_t, std::chrono::milliseconds> last_pause_;   // of jobs stopped by the store before, until they progress
+  std::map<std::int64_t, std::chrono::milliseconds>
+      last_pause_;  // of jobs stopped by the store before, until they progress
   std::vector<std::thread> threads_;
 };
 

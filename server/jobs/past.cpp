@@ -61,8 +61,8 @@ Result<ColonyAt> Past::colony_after(const JobRow& job, std::uint64_t seq) {
   }
   try {
     auto colony = start != nullptr ? std::make_shared<Colony>(*start) : std::make_shared<Colony>(spec->params);
-    const Status folded = for_each_event(store_, job.job_key, colony->last_seq(), seq,
-                                         [&](const Event& event) { colony->apply(event); });
+    const Status folded =
+        for_each_event(store_, job.job_key, colony->last_seq(), seq, [&](const Event& event) { colony->apply(event); });
     if (!folded) return folded.error();
     const std::lock_guard lock(mutex_);
     colonies_.push_front({job.job_key, seq, colony, spec});
@@ -92,7 +92,7 @@ Result<std::vector<SeriesRow>> Past::series(const JobRow& job, std::size_t point
   std::vector<SeriesRow> rows;
   try {
     Colony colony(spec->params);
-    std::optional<SeriesRow> measured;     // of the colony as it is now
+    std::optional<SeriesRow> measured;  // of the colony as it is now
     const auto add_row = [&] {
       if (!measured) measured = measure_series(colony, 0.0);
       measured->time_h = time_of(rows.size());

@@ -25,15 +25,25 @@ class Past {
   void forget(std::int64_t job_key);
 
  private:
-  struct KeptColony { std::int64_t job_key; std::uint64_t seq; std::shared_ptr<const Colony> colony; std::shared_ptr<const RunSpec> spec; };
-  struct KeptSeries { std::int64_t job_key; std::uint64_t last_seq; std::size_t points; std::vector<SeriesRow> rows; };
+  struct KeptColony {
+    std::int64_t job_key;
+    std::uint64_t seq;
+    std::shared_ptr<const Colony> colony;
+    std::shared_ptr<const RunSpec> spec;
+  };
+  struct KeptSeries {
+    std::int64_t job_key;
+    std::uint64_t last_seq;
+    std::size_t points;
+    std::vector<SeriesRow> rows;
+  };
 
-  Store& store_;                           // fixed after construction
+  Store& store_;  // fixed after construction
   const SpecDecoder& decode_;
   const std::size_t colonies_max_;
-  std::mutex mutex_;                       // guards everything below
-  std::list<KeptColony> colonies_;         // used last: first; at most colonies_max_
-  std::list<KeptSeries> series_;           // used last: first; at most kSeriesMax
+  std::mutex mutex_;                // guards everything below
+  std::list<KeptColony> colonies_;  // used last: first; at most colonies_max_
+  std::list<KeptSeries> series_;    // used last: first; at most kSeriesMax
 };
 
 }  // namespace colony::server

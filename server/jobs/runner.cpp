@@ -16,7 +16,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 constexpr std::size_t kReplayPage = 2000;
 constexpr std::size_t kBatchEvents = 200;
-constexpr std::chrono::milliseconds kBatchAge{20};         // then a live watcher sees it, also when searches are slow
+constexpr std::chrono::milliseconds kBatchAge{20};  // then a live watcher sees it, also when searches are slow
 
 /// The store failed, or closed: not the job's fault.
 struct StorageStop {};
@@ -37,7 +37,7 @@ class Commits {
   }
 
  private:
-  mutable std::mutex mutex_;                               // guards everything below
+  mutable std::mutex mutex_;  // guards everything below
   std::optional<Error> error_;
 };
 
@@ -50,7 +50,7 @@ class Run {
 
  private:
   RunEnd begin();
-  bool replay();                                           // false: asked to stop
+  bool replay();  // false: asked to stop
   RunEnd grow();
   RunEnd stop(LiveJob::Wish wish);
   RunEnd end(JobState state, const std::string& reason, const std::string& detail);
@@ -68,12 +68,12 @@ class Run {
 
   const RunnerEnvironment& env_;
   const std::shared_ptr<LiveJob> live_;
-  JobRow tail_;                                            // the row as it will be when everything taken is committed
+  JobRow tail_;  // the row as it will be when everything taken is committed
   std::unique_ptr<Simulator> simulator_;
   std::uint64_t founders_ = 0;
-  std::uint64_t next_hour_ = 0;                            // first whole model hour without a series row
-  std::optional<SeriesRow> measured_;                      // of the colony as it is now
-  std::vector<Event> events_;                              // taken, not yet given to the store
+  std::uint64_t next_hour_ = 0;        // first whole model hour without a series row
+  std::optional<SeriesRow> measured_;  // of the colony as it is now
+  std::vector<Event> events_;          // taken, not yet given to the store
   std::vector<SeriesRow> series_;
   Clock::time_point batch_since_{};
   const std::shared_ptr<Commits> commits_ = std::make_shared<Commits>();
@@ -97,23 +97,25 @@ RunEnd Run::go() {
                             std::string(error.what()) + "; " + replay_hint(tail_.last_seq + 1));
     }
   } catch (const StorageStop&) {
-    (void)env_.store.flush();                              // its answer is no news; after it no callback of ours is left
+    (void)env_.store.flush();  // its answer is no news; after it no callback of ours is left
     return RunEnd::kStorage;
   }
 }
 
 RunEnd Run::begin() {
-  tail_ = reread();                                        // with a wish that came before this run could be notified
+  tail_ = reread();  // with a wish that came before this run could be notified
   if (tail_.command == "cancel") live_->ask(LiveJob::Wish::kCancel);
   if (tail_.command == "pause") live_->ask(LiveJob::Wish::kPause);
   if (live_->wish() != LiveJob::Wish::kNone) return stop(live_->wish());
   if (results_version_of(tail_.engine_version) != kResultsVersion) {
-    return fail_as_stored("engine_changed", FinishReason::kEngineChanged,
-                          "begun by version " + tail_.engine_version + ", which gives other results than " +
-                              engine_version_text());
+    return fail_as_stored(
+        "engine_changed", FinishReason::kEngineChanged,
+        "begun by version " + tail_.engine_version + ", which gives other results than " + engine_version_text());
   }
   auto spec = env_.decode(tail_.spec_json);
-  if (!spec) return fail_as_stored("internal", FinishReason::kInternal, "the stored spec cannot be used: " + spec.error().message);
+  if (!spec)
+    return fail_as_stored("internal", FinishReason::kInternal,
+                          "the stored spec cannot be used: " + spec.error().message);
   const FounderParams& founders = spec->params.founders;
   founders_ = founders.positions_um.empty() ? static_cast<std::uint64_t>(founders.count) : founders.positions_um.size();
   simulator_ = std::make_unique<Simulator>(std::move(*spec));
@@ -127,7 +129,7 @@ bool Run::replay() {
     if (live_->wish() != LiveJob::Wish::kNone) return false;
     const auto page = env_.store.read_events(tail_.job_key, filter, kReplayPage);
     if (!page) throw StorageStop{};
-    CHECK(!page->empty());                                 // last_seq says that there are more
+    CHECK(!page->empty());  // last_seq says that there are more
     for (const Event& event : *page) {
       const FailureContext context("folding stored event " + std::to_string(event.seq) + " of job " + tail_.id);
       simulator_->replay(event);
@@ -137,9 +139,10 @@ bool Run::replay() {
   const Colony& colony = simulator_->colony();
   CHECK(colony.last_seq() == tail_.last_seq);
   CHECK(colony.digest() == tail_.digest);
-  next_hour_ = static_cast<std::uint64_t>(std::ceil(tail_.time_h));   // every hour before the last event has its row
-  const Status logged = env_.store.add_log(tail_.job_key, "info", "goes on after " + std::to_string(tail_.last_seq) +
-                                                                      " stored events, digest " + tail_.digest.hex());
+  next_hour_ = static_cast<std::uint64_t>(std::ceil(tail_.time_h));  // every hour before the last event has its row
+  const Status logged = env_.store.add_log(
+      tail_.job_key, "info",
+      "goes on after " + std::to_string(tail_.last_seq) + " stored events, digest " + tail_.digest.hex());
   if (!logged) throw StorageStop{};
   return true;
 }
@@ -154,7 +157,7 @@ RunEnd Run::grow() {
       const FailureContext context("deciding event " + std::to_string(tail_.last_seq + 1) + " of job " + tail_.id);
       event = simulator_->step();
     }
-    CHECK(event.has_value());                              // `finished` comes first, and ends this loop
+    CHECK(event.has_value());  // `finished` comes first, and ends this loop
     const bool finished = event->kind() == EventKind::kFinished;
     take(std::move(*event));
     if (finished) {
@@ -165,8 +168,9 @@ RunEnd Run::grow() {
                               "more than " + std::to_string(env_.config.cells_max) + " cells (limits.cells_per_job)");
     }
     if (tail_.last_seq >= env_.config.events_max) {
-      return end_from_outside(JobState::kFailed, FinishReason::kLimit,
-                              "more than " + std::to_string(env_.config.events_max) + " events (limits.events_per_job)");
+      return end_from_outside(
+          JobState::kFailed, FinishReason::kLimit,
+          "more than " + std::to_string(env_.config.events_max) + " events (limits.events_per_job)");
     }
     if (events_.size() >= kBatchEvents || Clock::now() >= batch_since_ + kBatchAge) append();
   }
@@ -187,7 +191,7 @@ void Run::take(Event event) {
     return static_cast<double>(hour) < event.time_h || (finished && static_cast<double>(hour) == event.time_h);
   };
   if (passed(next_hour_)) {
-    if (finished && !measured_) measured_ = measure_series(colony, 0.0);   // `finished` changes no cell
+    if (finished && !measured_) measured_ = measure_series(colony, 0.0);  // `finished` changes no cell
     CHECK(measured_.has_value());
     for (; passed(next_hour_); ++next_hour_) {
       measured_->time_h = static_cast<double>(next_hour_);
@@ -221,14 +225,15 @@ EventBatch Run::take_batch() {
 void Run::append() {
   if (events_.empty()) return;
   // The run settles its commits before it returns, so the hub is there as long as this callback can come.
-  env_.store.append_events(take_batch(), [commits = commits_, live = live_, &hub = env_.hub, stored = tail_](const Status& status) {
-    if (!status) {
-      commits->fail(status.error());
-      return;
-    }
-    live->committed(stored);
-    hub.announce(stored.job_key);
-  });
+  env_.store.append_events(take_batch(),
+                           [commits = commits_, live = live_, &hub = env_.hub, stored = tail_](const Status& status) {
+                             if (!status) {
+                               commits->fail(status.error());
+                               return;
+                             }
+                             live->committed(stored);
+                             hub.announce(stored.job_key);
+                           });
 }
 
 void Run::settle_commits() {
@@ -245,7 +250,7 @@ RunEnd Run::stop(LiveJob::Wish wish) {
   const auto paused = env_.store.set_state(tail_.job_key, {JobState::kRunning}, JobState::kPaused, "user", "");
   if (paused) return RunEnd::kDone;
   if (paused.error().code != ErrorCode::kConflict) throw StorageStop{};
-  CHECK(reread().command == "cancel");                     // the one thing that forbids a pause, and it came meanwhile
+  CHECK(reread().command == "cancel");  // the one thing that forbids a pause, and it came meanwhile
   return end_from_outside(JobState::kCancelled, FinishReason::kCancelled, "");
 }
 

@@ -20,9 +20,9 @@ struct RunnerEnvironment {
 };
 
 enum class RunEnd {
-  kDone,      // ended or paused: the row says how
-  kDrained,   // still `running` in the store, to go on later
-  kStorage,   // the store refused; the same, to go on when it is writable again
+  kDone,     // ended or paused: the row says how
+  kDrained,  // still `running` in the store, to go on later
+  kStorage,  // the store refused; the same, to go on when it is writable again
 };
 
 /// `job` is in state running. Everything it stored is committed when this returns.

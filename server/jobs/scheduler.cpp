@@ -6,7 +6,7 @@
 
 namespace colony::server {
 namespace {
-constexpr int kPauseDoublings = 64;   // the longest pause between two tries, in first pauses
+constexpr int kPauseDoublings = 64;  // the longest pause between two tries, in first pauses
 }  // namespace
 
 LocalJobService::LocalJobService(Store& store, JobsConfig config, SpecDecoder decode)
@@ -48,7 +48,7 @@ Status LocalJobService::start() {
 void LocalJobService::drain() {
   std::vector<std::thread> threads;
   {
-    const std::lock_guard take_lock(take_mutex_);          // so that no job is between store and live_
+    const std::lock_guard take_lock(take_mutex_);  // so that no job is between store and live_
     const std::lock_guard lock(mutex_);
     draining_ = true;
     for (const auto& [job_key, live] : live_) live->ask(LiveJob::Wish::kDrain);
@@ -56,7 +56,7 @@ void LocalJobService::drain() {
   }
   changed_.notify_all();
   for (std::thread& thread : threads) thread.join();
-  (void)store_.flush();   // a store that cannot commit has told the runners so
+  (void)store_.flush();  // a store that cannot commit has told the runners so
 }
 
 void LocalJobService::nudge_runners() {
@@ -104,7 +104,7 @@ void LocalJobService::run_loop() {
       const auto work = [&] { return draining_ || nudges_ != nudges || !running_before_.empty(); };
       if (taken) {
         changed_.wait(lock, work);
-      } else {   // the store could not say: ask again later
+      } else {  // the store could not say: ask again later
         changed_.wait_for(lock, std::chrono::milliseconds(config_.storage_retry_ms), work);
       }
       continue;
@@ -125,7 +125,8 @@ void LocalJobService::run_loop() {
 
 void LocalJobService::stall(const JobRow& job, bool made_progress) {
   // May fail as everything else does now; then view_of() tells it, and the next try starts from `running`.
-  (void)store_.set_state(job.job_key, {JobState::kRunning}, JobState::kPaused, "storage", "the database refused events");
+  (void)store_.set_state(job.job_key, {JobState::kRunning}, JobState::kPaused, "storage",
+                         "the database refused events");
   const std::lock_guard lock(mutex_);
   const std::chrono::milliseconds first(config_.storage_retry_ms);
   std::chrono::milliseconds& pause = last_pause_[job.job_key];
@@ -177,7 +178,8 @@ bool LocalJobService::retry(std::int64_t job_key) {
     running_before_.push_back(*job);
     return true;
   }
-  const auto resumed = store_.command_job(job_key, JobCommand::kResumeStorage);   // leaves it alone if a person paused it
+  const auto resumed =
+      store_.command_job(job_key, JobCommand::kResumeStorage);  // leaves it alone if a person paused it
   return resumed || resumed.error().code == ErrorCode::kConflict;
 }
 

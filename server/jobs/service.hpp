@@ -86,8 +86,8 @@ class JobService {
   /// `points` rows in equal steps from 0 to the end (values after the last event <= t).
   virtual Result<std::vector<SeriesRow>> series(const std::string& id, std::size_t points) = 0;
 
-  /// Calls `wake` (any thread, must not block nor call the service, may be spurious) after every commit, progress change (at most 5 a second)
-  /// and state change of the job, until the subscription is destroyed.
+  /// Calls `wake` (any thread, may be spurious; it must not block, call the service or end a subscription) after every commit
+  /// and every state change of the job, until the subscription is destroyed. Progress changes only with commits.
   class Subscription { public: virtual ~Subscription() = default; };
   virtual std::unique_ptr<Subscription> subscribe(std::int64_t job_key, std::function<void()> wake) = 0;
 

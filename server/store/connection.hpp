@@ -39,10 +39,10 @@ class Statement {
   /// Parameters are numbered from 1; every bind returns *this so that they chain in order.
   Statement& bind(std::int64_t value);
   Statement& bind(double value);
-  Statement& bind(std::string_view value);          // text; copied
+  Statement& bind(std::string_view value);  // text; copied
   Statement& bind_null();
   Statement& bind(const std::optional<double>& value);
-  Statement& bind_text_or_null(const std::string& value);   // empty: NULL
+  Statement& bind_text_or_null(const std::string& value);  // empty: NULL
   Statement& bind_blob(std::span<const std::uint8_t> value);
 
   /// True if there is a row. After the last row the statement is reset.
@@ -55,13 +55,15 @@ class Statement {
   std::int64_t integer(int column) const { return sqlite3_column_int64(statement_.get(), column); }
   double real(int column) const { return sqlite3_column_double(statement_.get(), column); }
   bool is_null(int column) const { return sqlite3_column_type(statement_.get(), column) == SQLITE_NULL; }
-  std::string text(int column) const;               // NULL: empty
+  std::string text(int column) const;  // NULL: empty
   std::span<const std::uint8_t> blob(int column) const;
   std::optional<double> optional_real(int column) const;
 
  private:
   void check(int code) const;
-  struct Finalise { void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); } };
+  struct Finalise {
+    void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
+  };
   sqlite3* db_;
   std::unique_ptr<sqlite3_stmt, Finalise> statement_;
   int next_ = 1;
@@ -92,9 +94,11 @@ class Connection {
   sqlite3* raw() { return db_.get(); }
 
  private:
-  struct Close { void operator()(sqlite3* db) const { sqlite3_close_v2(db); } };
+  struct Close {
+    void operator()(sqlite3* db) const { sqlite3_close_v2(db); }
+  };
   std::unique_ptr<sqlite3, Close> db_;
-  std::map<const char*, std::unique_ptr<Statement>> statements_;   // by address of the literal; after db_: dies first
+  std::map<const char*, std::unique_ptr<Statement>> statements_;  // by address of the literal; after db_: dies first
   int wal_pages_ = 0;
 };
 

@@ -2,19 +2,18 @@
 
 #include <cerrno>
 #include <cstring>
-#include <filesystem>
-#include <system_error>
-
 #include <fcntl.h>
+#include <filesystem>
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
+#include <system_error>
 #include <unistd.h>
 
 namespace colony::server {
 namespace {
 Error storage_error(const std::string& what, int code) {
-  return {ErrorCode::kStorage, what + ": " + std::strerror(code)};   // NOLINT(concurrency-mt-unsafe): glibc's is safe
+  return {ErrorCode::kStorage, what + ": " + std::strerror(code)};  // NOLINT(concurrency-mt-unsafe): glibc's is safe
 }
 }  // namespace
 
@@ -26,7 +25,8 @@ Result<std::unique_ptr<DataDir>> DataDir::open(const std::string& path) {
   const std::filesystem::path parent = std::filesystem::absolute(path, failed).lexically_normal().parent_path();
   if (!failed) std::filesystem::create_directories(parent, failed);
   if (failed) return storage_error("cannot make the folder above " + path, failed.value());
-  if (mkdir(path.c_str(), 0700) != 0 && errno != EEXIST) return storage_error("cannot make the data folder " + path, errno);
+  if (mkdir(path.c_str(), 0700) != 0 && errno != EEXIST)
+    return storage_error("cannot make the data folder " + path, errno);
 
   const int lock = ::open((path + "/LOCK").c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600);
   if (lock < 0) return storage_error("cannot open " + path + "/LOCK", errno);

@@ -24,8 +24,8 @@ class DataDir {
 
  private:
   DataDir(std::string path, int lock_fd) : path_(std::move(path)), lock_fd_(lock_fd) {}
-  const std::string path_;   // fixed after construction
-  const int lock_fd_;        // closing it gives the lock back, also when the process dies
+  const std::string path_;  // fixed after construction
+  const int lock_fd_;       // closing it gives the lock back, also when the process dies
 };
 
 }  // namespace colony::server

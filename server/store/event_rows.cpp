@@ -12,8 +12,10 @@ namespace {
 constexpr const char* kInsertPlacement =
     "INSERT INTO placement VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)";
 constexpr const char* kSelectPlacement =
-    "SELECT cell_id, parent_id, generation, ordinal, activity, x_um, y_um, z_um, nucleus_x_um, nucleus_y_um, nucleus_z_um,"
-    " nucleus_radius_um, a_um, b_um, c_um, w1_rad, w2_rad, w3_rad, noise_u, noise_v, noise_w, born_h, due_h, settle_due_h,"
+    "SELECT cell_id, parent_id, generation, ordinal, activity, x_um, y_um, z_um, nucleus_x_um, nucleus_y_um, "
+    "nucleus_z_um,"
+    " nucleus_radius_um, a_um, b_um, c_um, w1_rad, w2_rad, w3_rad, noise_u, noise_v, noise_w, born_h, due_h, "
+    "settle_due_h,"
     " move_due_h, free_share, try_count, volume_um3, deformed_volume_um3, nearest_membrane_x_um, nearest_membrane_y_um,"
     " nearest_membrane_z_um FROM placement WHERE job_key = ? AND seq = ? ORDER BY slot";
 constexpr const char* kInsertEvent =
@@ -28,13 +30,30 @@ constexpr const char* kSelectWoken =
     "SELECT cell_id, free_share, due_h FROM woken WHERE job_key = ? AND seq = ? ORDER BY slot";
 constexpr const char* kInsertSeries = "INSERT INTO series VALUES (?,?,?,?,?,?,?,?,?,?,?)";
 constexpr const char* kSelectSeries =
-    "SELECT time_h, cell_count, active_count, passive_count, senescent_count, volume_mean_um3, volume_sd_um3, radius_um,"
+    "SELECT time_h, cell_count, active_count, passive_count, senescent_count, volume_mean_um3, volume_sd_um3, "
+    "radius_um,"
     " area_um2, density_per_mm2 FROM series WHERE job_key = ? ORDER BY time_h";
 
 // Column numbers of kEventColumns.
 enum Column {
-  kSeq, kTime, kKind, kCell, kDigest, kPlane, kNormal = kPlane + 3, kDirection = kNormal + 3, kFitness = kDirection + 3,
-  kEvaluations, kCorrected, kFreeShare, kTries, kNucleus, kMembrane = kNucleus + 3, kVolume = kMembrane + 3, kDue, kReason,
+  kSeq,
+  kTime,
+  kKind,
+  kCell,
+  kDigest,
+  kPlane,
+  kNormal = kPlane + 3,
+  kDirection = kNormal + 3,
+  kFitness = kDirection + 3,
+  kEvaluations,
+  kCorrected,
+  kFreeShare,
+  kTries,
+  kNucleus,
+  kMembrane = kNucleus + 3,
+  kVolume = kMembrane + 3,
+  kDue,
+  kReason,
   kCellCount
 };
 
@@ -44,7 +63,7 @@ std::int64_t signed_of(std::uint64_t value) {
 }
 
 void bind_exact(Statement& to, double value) {
-  CHECK(std::isfinite(value) && !(value == 0.0 && std::signbit(value)));   // else SQLite stores NULL, or loses the sign
+  CHECK(std::isfinite(value) && !(value == 0.0 && std::signbit(value)));  // else SQLite stores NULL, or loses the sign
   to.bind(value);
 }
 
@@ -64,7 +83,9 @@ void bind_nulls(Statement& to, int count) {
   for (int i = 0; i < count; ++i) to.bind_null();
 }
 
-Vec3 vector_at(const Statement& row, int column) { return {row.real(column), row.real(column + 1), row.real(column + 2)}; }
+Vec3 vector_at(const Statement& row, int column) {
+  return {row.real(column), row.real(column + 1), row.real(column + 2)};
+}
 
 CellId cell_id_at(const Statement& row, int column) { return {static_cast<std::uint32_t>(row.integer(column))}; }
 
@@ -222,12 +243,16 @@ Event event_at(const Statement& row) {
       break;
     }
     case EventKind::kInhibited:
-      event.body = Inhibited{row.real(kFitness), row.real(kFreeShare), static_cast<std::int32_t>(row.integer(kTries)),
-                             static_cast<std::uint32_t>(row.integer(kEvaluations)), row.integer(kCorrected) != 0,
+      event.body = Inhibited{row.real(kFitness),
+                             row.real(kFreeShare),
+                             static_cast<std::int32_t>(row.integer(kTries)),
+                             static_cast<std::uint32_t>(row.integer(kEvaluations)),
+                             row.integer(kCorrected) != 0,
                              row.optional_real(kDue)};
       break;
     case EventKind::kSettled:
-      event.body = Settled{vector_at(row, kNucleus), vector_at(row, kMembrane), row.real(kVolume), row.optional_real(kDue)};
+      event.body =
+          Settled{vector_at(row, kNucleus), vector_at(row, kMembrane), row.real(kVolume), row.optional_real(kDue)};
       break;
     case EventKind::kMoved:
       event.body = Moved{};
@@ -300,18 +325,21 @@ std::size_t row_count(const Event& event) {
   return std::holds_alternative<Founded>(event.body) ? 2 : 1;
 }
 
-std::vector<Event> read_events(Connection& connection, std::int64_t job_key, const EventFilter& filter, std::size_t limit) {
+std::vector<Event> read_events(Connection& connection, std::int64_t job_key, const EventFilter& filter,
+                               std::size_t limit) {
   std::string sql = kEventColumns;
   if (!filter.kinds.empty()) {
     sql += " AND kind IN (";
     for (std::size_t i = 0; i < filter.kinds.size(); ++i) {
-      sql += (i == 0 ? "'" : ", '") + std::string(name_of(filter.kinds[i])) + "'";   // names of ours, never a client's text
+      sql +=
+          (i == 0 ? "'" : ", '") + std::string(name_of(filter.kinds[i])) + "'";  // names of ours, never a client's text
     }
     sql += ")";
   }
   if (filter.cell_id) {
-    sql += " AND seq IN (SELECT seq FROM event WHERE job_key = ?1 AND cell_id = ?4 AND seq > ?2"
-           " UNION SELECT seq FROM placement WHERE job_key = ?1 AND cell_id = ?4 AND seq > ?2)";
+    sql +=
+        " AND seq IN (SELECT seq FROM event WHERE job_key = ?1 AND cell_id = ?4 AND seq > ?2"
+        " UNION SELECT seq FROM placement WHERE job_key = ?1 AND cell_id = ?4 AND seq > ?2)";
   }
   sql += " ORDER BY seq LIMIT ?3";
   constexpr auto kMax = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
@@ -333,7 +361,8 @@ void write_series(Connection& connection, std::int64_t job_key, const SeriesRow&
   bind_exact(to, row.time_h);
   to.bind(signed_of(row.cell_count)).bind(signed_of(row.active_count));
   to.bind(signed_of(row.passive_count)).bind(signed_of(row.senescent_count));
-  for (const double value : {row.volume_mean_um3, row.volume_sd_um3, row.radius_um, row.area_um2, row.density_per_mm2}) {
+  for (const double value :
+       {row.volume_mean_um3, row.volume_sd_um3, row.radius_um, row.area_um2, row.density_per_mm2}) {
     bind_exact(to, value);
   }
   to.run();

@@ -19,7 +19,8 @@ void write_event(Connection& connection, std::int64_t job_key, const Event& even
 /// Rows that write_event makes of it, all tables together.
 std::size_t row_count(const Event& event);
 /// Up to `limit` events that pass the filter, ascending. Call inside a read transaction.
-std::vector<Event> read_events(Connection& connection, std::int64_t job_key, const EventFilter& filter, std::size_t limit);
+std::vector<Event> read_events(Connection& connection, std::int64_t job_key, const EventFilter& filter,
+                               std::size_t limit);
 
 void write_series(Connection& connection, std::int64_t job_key, const SeriesRow& row);
 std::vector<SeriesRow> read_series(Connection& connection, std::int64_t job_key);

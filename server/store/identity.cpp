@@ -2,15 +2,16 @@
 
 #include <array>
 #include <chrono>
-#include <ctime>
 #include <cstdio>
+#include <ctime>
 #include <random>
 
 namespace colony::server {
 namespace {
 
 std::int64_t now_ms() {
-  return std::chrono::duration_cast<std::chrono::milliseconds>(std::chrono::system_clock::now().time_since_epoch()).count();
+  return std::chrono::duration_cast<std::chrono::milliseconds>(std::chrono::system_clock::now().time_since_epoch())
+      .count();
 }
 
 std::string hex16(std::uint64_t value) {
@@ -19,7 +20,7 @@ std::string hex16(std::uint64_t value) {
   return text.data();
 }
 
-std::uint64_t mix(std::uint64_t x) {   // the finaliser of SplitMix64: every input bit reaches every output bit
+std::uint64_t mix(std::uint64_t x) {  // the finaliser of SplitMix64: every input bit reaches every output bit
   x ^= x >> 30;
   x *= 0xBF58476D1CE4E5B9ULL;
   x ^= x >> 27;
@@ -60,13 +61,13 @@ std::string wall_time_text() {
 }
 
 std::string new_job_id() {
-  std::random_device device;   // the system's generator on Linux
+  std::random_device device;  // the system's generator on Linux
   const auto draw = [&device] { return static_cast<std::uint64_t>(device()) << 32 | device(); };
   const std::uint64_t high = static_cast<std::uint64_t>(now_ms()) << 16 | 0x7000U | (draw() & 0xFFFU);
   const std::uint64_t low = 0x8000000000000000ULL | (draw() >> 2);
   const std::string digits = hex16(high) + hex16(low);
-  return digits.substr(0, 8) + "-" + digits.substr(8, 4) + "-" + digits.substr(12, 4) + "-" + digits.substr(16, 4) + "-" +
-         digits.substr(20);
+  return digits.substr(0, 8) + "-" + digits.substr(8, 4) + "-" + digits.substr(12, 4) + "-" + digits.substr(16, 4) +
+         "-" + digits.substr(20);
 }
 
 std::string cursor_text(std::int64_t job_key, std::int64_t salt) {

@@ -72,10 +72,12 @@ std::optional<JobRow> find_job_row(Connection& connection, const std::string& id
 }
 
 std::optional<JobRow> oldest_queued_row(Connection& connection) {
-  return first_row(connection, connection.prepared(COLONY_JOB_COLUMNS " AND state = 'queued' ORDER BY job_key LIMIT 1"));
+  return first_row(connection,
+                   connection.prepared(COLONY_JOB_COLUMNS " AND state = 'queued' ORDER BY job_key LIMIT 1"));
 }
 
-std::vector<JobRow> list_job_rows(Connection& connection, const JobFilter& filter, std::int64_t before, std::size_t limit) {
+std::vector<JobRow> list_job_rows(Connection& connection, const JobFilter& filter, std::int64_t before,
+                                  std::size_t limit) {
   std::string sql = COLONY_JOB_COLUMNS " AND job_key < ?";
   if (filter.state) sql += " AND state = ?";
   if (filter.kind) sql += " AND kind = ?";
@@ -110,7 +112,8 @@ std::vector<std::uint64_t> count_job_rows(Connection& connection) {
 std::int64_t insert_job_row(Connection& connection, const NewJob& job) {
   Statement& to = connection.prepared(
       "INSERT INTO job (id, kind, name, state, reason, detail, submitted_by, created_at, revision, last_seq, digest,"
-      " engine_version, spec, until_time_h, until_cells, time_h, cell_count, active_count, passive_count, senescent_count)"
+      " engine_version, spec, until_time_h, until_cells, time_h, cell_count, active_count, passive_count, "
+      "senescent_count)"
       " VALUES (?, 'colony', ?, 'queued', '', '', ?, ?, 1, 0, ?, ?, ?, ?, ?, 0, 0, 0, 0, 0)");
   to.bind(std::string_view(new_job_id())).bind(std::string_view(job.name)).bind(std::string_view(job.submitted_by));
   to.bind(std::string_view(wall_time_text())).bind_blob(Digest{}.bytes).bind(std::string_view(engine_version_text()));
@@ -124,7 +127,10 @@ std::int64_t insert_job_row(Connection& connection, const NewJob& job) {
   const std::int64_t job_key = connection.last_rowid();
   for (const auto& [name, value] : job.labels) {
     connection.prepared("INSERT INTO label VALUES (?, ?, ?)")
-        .bind(job_key).bind(std::string_view(name)).bind(std::string_view(value)).run();
+        .bind(job_key)
+        .bind(std::string_view(name))
+        .bind(std::string_view(value))
+        .run();
   }
   return job_key;
 }
@@ -159,14 +165,19 @@ void insert_used_key(Connection& connection, const NewJob& job, std::int64_t job
   to.bind(std::string_view(job.body_hash)).bind(job_key).run();
 }
 
-void insert_log_row(Connection& connection, std::int64_t job_key, const std::string& level, const std::string& message) {
+void insert_log_row(Connection& connection, std::int64_t job_key, const std::string& level,
+                    const std::string& message) {
   Statement& to = connection.prepared(
       "INSERT INTO job_log SELECT ?1, coalesce(max(line), 0) + 1, ?2, ?3, ?4 FROM job_log WHERE job_key = ?1");
-  to.bind(job_key).bind(std::string_view(wall_time_text())).bind(std::string_view(level)).bind(std::string_view(message));
+  to.bind(job_key)
+      .bind(std::string_view(wall_time_text()))
+      .bind(std::string_view(level))
+      .bind(std::string_view(message));
   to.run();
 }
 
-std::vector<LogRow> read_log_rows(Connection& connection, std::int64_t job_key, std::int64_t after_index, std::size_t limit) {
+std::vector<LogRow> read_log_rows(Connection& connection, std::int64_t job_key, std::int64_t after_index,
+                                  std::size_t limit) {
   Statement& row = connection.prepared(
       "SELECT line, at, level, message FROM job_log WHERE job_key = ? AND line > ? ORDER BY line LIMIT ?");
   constexpr auto kMax = static_cast<std::size_t>(std::numeric_limits<std::int64_t>::max());
@@ -193,8 +204,9 @@ bool sweep_deleted(Connection& connection, std::int64_t seqs) {
   const std::int64_t end = has_events ? first.integer(0) + seqs : 0;
   first.reset();
   if (has_events) {
-    for (const char* sql : {"DELETE FROM placement WHERE job_key = ? AND seq < ?", "DELETE FROM woken WHERE job_key = ? AND seq < ?",
-                            "DELETE FROM event WHERE job_key = ? AND seq < ?"}) {
+    for (const char* sql :
+         {"DELETE FROM placement WHERE job_key = ? AND seq < ?", "DELETE FROM woken WHERE job_key = ? AND seq < ?",
+          "DELETE FROM event WHERE job_key = ? AND seq < ?"}) {
       connection.prepared(sql).bind(job_key).bind(end).run();
     }
     return true;

@@ -18,7 +18,8 @@ std::optional<JobRow> find_job_row(Connection& connection, const std::string& id
 /// The oldest queued job.
 std::optional<JobRow> oldest_queued_row(Connection& connection);
 /// Newest first, with job_key < before.
-std::vector<JobRow> list_job_rows(Connection& connection, const JobFilter& filter, std::int64_t before, std::size_t limit);
+std::vector<JobRow> list_job_rows(Connection& connection, const JobFilter& filter, std::int64_t before,
+                                  std::size_t limit);
 std::vector<std::uint64_t> count_job_rows(Connection& connection);
 
 /// A new queued job; returns its key.
@@ -26,12 +27,16 @@ std::int64_t insert_job_row(Connection& connection, const NewJob& job);
 /// Writes back everything that can change: state, reason, detail, command, wall times, revision, last_seq, digest, counts, time.
 void update_job_row(Connection& connection, const JobRow& job);
 
-struct UsedKey { std::int64_t job_key = 0; std::string body_hash; };
+struct UsedKey {
+  std::int64_t job_key = 0;
+  std::string body_hash;
+};
 std::optional<UsedKey> find_used_key(Connection& connection, const NewJob& job);
 void insert_used_key(Connection& connection, const NewJob& job, std::int64_t job_key);
 
 void insert_log_row(Connection& connection, std::int64_t job_key, const std::string& level, const std::string& message);
-std::vector<LogRow> read_log_rows(Connection& connection, std::int64_t job_key, std::int64_t after_index, std::size_t limit);
+std::vector<LogRow> read_log_rows(Connection& connection, std::int64_t job_key, std::int64_t after_index,
+                                  std::size_t limit);
 
 /// Takes the job out of every reader's sight, and frees its idempotency key and labels.
 void mark_job_deleted(Connection& connection, std::int64_t job_key);

@@ -58,7 +58,7 @@ class ReaderPool {
     std::unique_ptr<Connection> connection;
   };
 
-  std::mutex mutex_;                                 // guards everything below
+  std::mutex mutex_;  // guards everything below
   std::condition_variable returned_;
   std::vector<std::unique_ptr<Connection>> free_;
 };

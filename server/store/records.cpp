@@ -24,9 +24,11 @@ bool is_terminal(JobState state) {
 bool may_follow(JobState from, JobState to) {
   switch (from) {
     case JobState::kQueued:
-      return to == JobState::kRunning || to == JobState::kPaused || to == JobState::kCancelled || to == JobState::kFailed;
+      return to == JobState::kRunning || to == JobState::kPaused || to == JobState::kCancelled ||
+             to == JobState::kFailed;
     case JobState::kRunning:
-      return to == JobState::kPaused || to == JobState::kSucceeded || to == JobState::kFailed || to == JobState::kCancelled;
+      return to == JobState::kPaused || to == JobState::kSucceeded || to == JobState::kFailed ||
+             to == JobState::kCancelled;
     case JobState::kPaused:
       return to == JobState::kQueued || to == JobState::kCancelled;
     case JobState::kSucceeded:

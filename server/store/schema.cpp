@@ -6,7 +6,7 @@
 namespace colony::server {
 namespace {
 
-constexpr std::int64_t kApplicationId = 0x436F6C79;   // "Coly"
+constexpr std::int64_t kApplicationId = 0x436F6C79;  // "Coly"
 
 // Histories are clustered by (job_key, seq): a page of events is one range of one tree. No foreign keys: a big history is
 // deleted in pieces by the sweeper, and a cascade would make one long transaction of it.
@@ -142,7 +142,7 @@ CREATE TABLE job_log (
 INSERT INTO meta VALUES ('cursor_salt', random()), ('writable_probe', 0);
 )sql";
 
-constexpr std::array<const char*, 1> kMigrations = {kVersion1};   // kMigrations[v] leads from version v to v + 1
+constexpr std::array<const char*, 1> kMigrations = {kVersion1};  // kMigrations[v] leads from version v to v + 1
 
 std::int64_t pragma(Connection& writer, const char* sql) {
   Statement statement = writer.prepare_once(sql);
@@ -159,11 +159,12 @@ void prepare_database(Connection& writer) {
     throw IncompatibleDatabase("colony.db is a database of another program");
   }
   if (version > static_cast<std::int64_t>(kMigrations.size())) {
-    throw IncompatibleDatabase("colony.db has schema version " + std::to_string(version) + ", this program knows up to " +
-                               std::to_string(kMigrations.size()));
+    throw IncompatibleDatabase("colony.db has schema version " + std::to_string(version) +
+                               ", this program knows up to " + std::to_string(kMigrations.size()));
   }
   Statement mode = writer.prepare_once("PRAGMA journal_mode = WAL");
-  if (!mode.step() || mode.text(0) != "wal") throw DbError(SQLITE_CANTOPEN, "the file system allows no write-ahead log");
+  if (!mode.step() || mode.text(0) != "wal")
+    throw DbError(SQLITE_CANTOPEN, "the file system allows no write-ahead log");
   mode.reset();
   writer.execute("PRAGMA synchronous = FULL");
   for (std::int64_t v = version; v < static_cast<std::int64_t>(kMigrations.size()); ++v) {

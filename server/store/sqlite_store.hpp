@@ -24,8 +24,8 @@ class SqliteStore final : public Store {
   Result<JobPage> list_jobs(const JobFilter& filter, std::size_t limit, const std::string& cursor) override;
   Result<std::vector<std::uint64_t>> count_jobs() override;
   Result<std::optional<JobRow>> take_queued_job() override;
-  Result<JobRow> set_state(std::int64_t job_key, const std::vector<JobState>& from, JobState to, const std::string& reason,
-                           const std::string& detail) override;
+  Result<JobRow> set_state(std::int64_t job_key, const std::vector<JobState>& from, JobState to,
+                           const std::string& reason, const std::string& detail) override;
   Result<JobRow> finish_job(const EventBatch& last, JobState state, const std::string& reason,
                             const std::string& detail) override;
   Result<Commanded> command_job(std::int64_t job_key, JobCommand command) override;
@@ -48,12 +48,12 @@ class SqliteStore final : public Store {
   template <class T, class Body>
   Result<T> write(Body body, bool in_order = false);
 
-  const StoreConfig config_;                    // fixed after construction
+  const StoreConfig config_;  // fixed after construction
   const std::unique_ptr<DataDir> dir_;
   std::int64_t cursor_salt_ = 0;
-  const std::unique_ptr<Connection> write_connection_;   // the writer thread's
-  std::unique_ptr<ReaderPool> readers_;         // synchronises itself
-  std::unique_ptr<Writer> writer_;              // synchronises itself
+  const std::unique_ptr<Connection> write_connection_;  // the writer thread's
+  std::unique_ptr<ReaderPool> readers_;                 // synchronises itself
+  std::unique_ptr<Writer> writer_;                      // synchronises itself
 };
 
 template <class T, class Body>
@@ -65,7 +65,7 @@ Result<T> SqliteStore::write(Body body, bool in_order) {
     return Ok{};
   };
   const Status status = in_order ? writer_->request_in_order(run) : writer_->request(run);
-  if (!status) return status.error();           // also when the commit failed after the body succeeded
+  if (!status) return status.error();  // also when the commit failed after the body succeeded
   return answer;
 }
 

@@ -11,7 +11,7 @@
 namespace colony::server {
 namespace {
 constexpr std::size_t kReaders = 4;
-constexpr std::int64_t kSweepSeqs = 1000;   // one step of deleting a history: a few ms
+constexpr std::int64_t kSweepSeqs = 1000;  // one step of deleting a history: a few ms
 constexpr std::uint64_t kPageBytes = 4096;
 }  // namespace
 
@@ -34,7 +34,8 @@ Result<std::unique_ptr<Store>> Store::open(const StoreConfig& config) {
   }
 }
 
-SqliteStore::SqliteStore(const StoreConfig& config, std::unique_ptr<DataDir> dir, std::unique_ptr<Connection> write_connection)
+SqliteStore::SqliteStore(const StoreConfig& config, std::unique_ptr<DataDir> dir,
+                         std::unique_ptr<Connection> write_connection)
     : config_(config), dir_(std::move(dir)), write_connection_(std::move(write_connection)) {
   Statement salt = write_connection_->prepare_once("SELECT value FROM meta WHERE name = 'cursor_salt'");
   if (!salt.step()) throw DbError(SQLITE_CORRUPT, "the cursor salt is missing");
@@ -48,8 +49,8 @@ SqliteStore::SqliteStore(const StoreConfig& config, std::unique_ptr<DataDir> dir
 }
 
 SqliteStore::~SqliteStore() {
-  writer_.reset();    // commits what is queued
-  readers_.reset();   // before the last checkpoint, so that it can move the whole log
+  writer_.reset();   // commits what is queued
+  readers_.reset();  // before the last checkpoint, so that it can move the whole log
   try {
     write_connection_->checkpoint(true);
   } catch (const DbError&) {

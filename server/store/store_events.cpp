@@ -58,7 +58,8 @@ Status SqliteStore::flush() {
   return writer_->request_in_order([](Connection&) -> Status { return Ok{}; });
 }
 
-Result<std::vector<Event>> SqliteStore::read_events(std::int64_t job_key, const EventFilter& filter, std::size_t limit) {
+Result<std::vector<Event>> SqliteStore::read_events(std::int64_t job_key, const EventFilter& filter,
+                                                    std::size_t limit) {
   return readers_->read([&](Connection& connection) -> Result<std::vector<Event>> {
     if (!find_job_row(connection, job_key)) return no_job();
     return server::read_events(connection, job_key, filter, limit);

@@ -21,7 +21,8 @@ Error wrong_state(const JobRow& job) {
 }
 
 /// Sets the state and everything that goes with it, writes the row and a line of the log.
-void change_state(Connection& connection, JobRow& job, JobState to, const std::string& reason, const std::string& detail) {
+void change_state(Connection& connection, JobRow& job, JobState to, const std::string& reason,
+                  const std::string& detail) {
   std::string line = std::string(name_of(job.state)) + " -> " + std::string(name_of(to));
   if (!reason.empty()) line += " (" + reason + ")";
   line += " at event " + std::to_string(job.last_seq);
@@ -71,7 +72,7 @@ Result<Store::Commanded> command_resume(Connection& connection, JobRow job, bool
   if (is_terminal(job.state)) return wrong_state(job);
   if (job.command == "cancel") return Error{ErrorCode::kConflict, "the job is being cancelled"};
   if (job.state != JobState::kPaused) {
-    const bool pending = job.command == "pause";      // it will be paused in a moment; then it can be resumed
+    const bool pending = job.command == "pause";  // it will be paused in a moment; then it can be resumed
     return Store::Commanded{std::move(job), false, pending};
   }
   if (only_storage && job.reason != "storage") return Store::Commanded{std::move(job), false, false};
@@ -86,7 +87,9 @@ Result<Store::Submitted> SqliteStore::create_job(const NewJob& job, std::size_t 
     if (!job.idempotency_key.empty()) {
       if (const auto used = find_used_key(connection, job)) {
         if (used->body_hash != job.body_hash) {
-          return Error{ErrorCode::kKeyReused, "the idempotency key was used with another body", {{"Idempotency-Key", "used before with another body"}}};
+          return Error{ErrorCode::kKeyReused,
+                       "the idempotency key was used with another body",
+                       {{"Idempotency-Key", "used before with another body"}}};
         }
         std::optional<JobRow> same = find_job_row(connection, used->job_key);
         if (!same) return no_job();
@@ -95,7 +98,8 @@ Result<Store::Submitted> SqliteStore::create_job(const NewJob& job, std::size_t 
     }
     const auto queued = count_job_rows(connection)[static_cast<std::size_t>(JobState::kQueued)];
     if (queued >= queued_max) {
-      return Error{ErrorCode::kBusy, std::to_string(queued) + " jobs are queued already; the limit is " + std::to_string(queued_max)};
+      return Error{ErrorCode::kBusy,
+                   std::to_string(queued) + " jobs are queued already; the limit is " + std::to_string(queued_max)};
     }
     const std::int64_t job_key = insert_job_row(connection, job);
     if (!job.idempotency_key.empty()) insert_used_key(connection, job, job_key);
@@ -126,16 +130,19 @@ Result<JobPage> SqliteStore::list_jobs(const JobFilter& filter, std::size_t limi
   std::int64_t before = std::numeric_limits<std::int64_t>::max();
   if (!cursor.empty()) {
     const auto key = cursor_key(cursor, cursor_salt_);
-    if (!key) return Error{ErrorCode::kInvalid, "the cursor was not given by this server", {{"cursor", "not a cursor of this server"}}};
+    if (!key)
+      return Error{
+          ErrorCode::kInvalid, "the cursor was not given by this server", {{"cursor", "not a cursor of this server"}}};
     before = *key;
   }
   constexpr std::size_t kPageMax = 100'000;
   if (limit == 0 || limit > kPageMax) {
-    return Error{ErrorCode::kInvalid, "limit is out of range", {{"limit", "must lie in 1.." + std::to_string(kPageMax)}}};
+    return Error{
+        ErrorCode::kInvalid, "limit is out of range", {{"limit", "must lie in 1.." + std::to_string(kPageMax)}}};
   }
   return readers_->read([&](Connection& connection) -> Result<JobPage> {
     JobPage page;
-    page.items = list_job_rows(connection, filter, before, limit + 1);   // one more tells whether there is a next page
+    page.items = list_job_rows(connection, filter, before, limit + 1);  // one more tells whether there is a next page
     if (page.items.size() > limit) {
       page.items.pop_back();
       page.next = cursor_text(page.items.back().job_key, cursor_salt_);
@@ -145,7 +152,8 @@ Result<JobPage> SqliteStore::list_jobs(const JobFilter& filter, std::size_t limi
 }
 
 Result<std::vector<std::uint64_t>> SqliteStore::count_jobs() {
-  return readers_->read([](Connection& connection) -> Result<std::vector<std::uint64_t>> { return count_job_rows(connection); });
+  return readers_->read(
+      [](Connection& connection) -> Result<std::vector<std::uint64_t>> { return count_job_rows(connection); });
 }
 
 Result<std::vector<JobRow>> SqliteStore::running_jobs() {
@@ -153,7 +161,7 @@ Result<std::vector<JobRow>> SqliteStore::running_jobs() {
     JobFilter running;
     running.state = JobState::kRunning;
     std::vector<JobRow> jobs = list_job_rows(connection, running, std::numeric_limits<std::int64_t>::max(), 1'000'000);
-    std::reverse(jobs.begin(), jobs.end());   // oldest first
+    std::reverse(jobs.begin(), jobs.end());  // oldest first
     return jobs;
   });
 }
@@ -222,7 +230,8 @@ Status SqliteStore::delete_job(std::int64_t job_key) {
     const std::optional<JobRow> job = find_job_row(connection, job_key);
     if (!job) return no_job();
     if (!is_terminal(job->state)) {
-      return Error{ErrorCode::kConflict, "the job is " + std::string(name_of(job->state)) + "; only an ended job can be deleted"};
+      return Error{ErrorCode::kConflict,
+                   "the job is " + std::string(name_of(job->state)) + "; only an ended job can be deleted"};
     }
     mark_job_deleted(connection, job_key);
     return Ok{};

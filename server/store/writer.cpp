@@ -9,16 +9,16 @@
 
 namespace colony::server {
 namespace {
-constexpr std::size_t kRequestsPerBatch = 256;       // so that a flood of requests cannot starve the events
-constexpr int kCheckpointPages = 1000;               // 4 MB of log
-constexpr int kCheckpointWaitPages = 25'000;         // 100 MB: readers kept the log from restarting for too long
+constexpr std::size_t kRequestsPerBatch = 256;  // so that a flood of requests cannot starve the events
+constexpr int kCheckpointPages = 1000;          // 4 MB of log
+constexpr int kCheckpointWaitPages = 25'000;    // 100 MB: readers kept the log from restarting for too long
 constexpr std::chrono::seconds kSweepRetry{10};
 
 Status run_task(WriteTask& task, Connection& connection) {
   try {
     return task.run(connection);
   } catch (const DbError& error) {
-    if (!error.is_constraint()) throw;               // the database is sick: the whole batch is undone
+    if (!error.is_constraint()) throw;  // the database is sick: the whole batch is undone
     return to_error(error);
   } catch (const std::exception& error) {
     return Error{ErrorCode::kInternal, error.what()};
@@ -40,7 +40,7 @@ Writer::~Writer() {
 }
 
 Status Writer::wait_for(std::function<Status(Connection&)> run, bool in_order) {
-  const auto promise = std::make_shared<std::promise<Status>>();   // shared: set_value may still touch it after get()
+  const auto promise = std::make_shared<std::promise<Status>>();  // shared: set_value may still touch it after get()
   std::future<Status> result = promise->get_future();
   WriteTask task{std::move(run), [promise](const Status& status) { promise->set_value(status); }, 1};
   {
@@ -126,9 +126,9 @@ void Writer::loop() {
       lock.lock();
       continue;
     }
-    if (ending_) return;                               // a sweep half done is completed at the next start
+    if (ending_) return;  // a sweep half done is completed at the next start
     if (sweep_pending_ && Clock::now() >= sweep_not_before_) {
-      sweep_pending_ = false;                          // before the sweep: a wake_sweep() meanwhile must not be lost
+      sweep_pending_ = false;  // before the sweep: a wake_sweep() meanwhile must not be lost
       lock.unlock();
       const bool more = sweep_once();
       checkpoint_if_long();

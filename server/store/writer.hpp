@@ -26,11 +26,12 @@ namespace colony::server {
 struct WriterLimits {
   std::size_t batch_rows_max = 1000;
   std::chrono::milliseconds batch_wait{50};
-  std::size_t queued_rows_max = 20'000;   // of bulk tasks; more wait in submit_bulk
+  std::size_t queued_rows_max = 20'000;  // of bulk tasks; more wait in submit_bulk
 };
 
 struct WriteTask {
-  std::function<Status(Connection&)> run;      // may run again after a failed batch: it must not keep results of a failed try
+  std::function<Status(Connection&)>
+      run;  // may run again after a failed batch: it must not keep results of a failed try
   std::function<void(const Status&)> done;
   std::size_t rows = 1;
 };
@@ -62,23 +63,23 @@ class Writer {
   void checkpoint_if_long();
   bool sweep_once();
 
-  Connection& connection_;                       // the writer thread's alone
-  const WriterLimits limits_;                    // fixed after construction
+  Connection& connection_;     // the writer thread's alone
+  const WriterLimits limits_;  // fixed after construction
   const std::function<bool(Connection&)> sweep_;
 
-  std::mutex mutex_;                             // guards everything below
+  std::mutex mutex_;  // guards everything below
   std::condition_variable work_;
   std::condition_variable room_;
   std::deque<WriteTask> requests_;
-  std::deque<WriteTask> bulk_;                   // at most limits_.queued_rows_max rows
+  std::deque<WriteTask> bulk_;  // at most limits_.queued_rows_max rows
   std::size_t bulk_rows_ = 0;
-  std::size_t urgent_bulk_ = 0;                  // tasks in bulk_ that somebody waits for
-  std::deque<bool> bulk_urgent_;                 // parallel to bulk_
-  Clock::time_point bulk_since_{};               // when the first task of the coming batch was queued
-  Clock::time_point sweep_not_before_{};         // after a failed sweep
-  bool sweep_pending_ = true;                    // a crash may have left one half done
+  std::size_t urgent_bulk_ = 0;           // tasks in bulk_ that somebody waits for
+  std::deque<bool> bulk_urgent_;          // parallel to bulk_
+  Clock::time_point bulk_since_{};        // when the first task of the coming batch was queued
+  Clock::time_point sweep_not_before_{};  // after a failed sweep
+  bool sweep_pending_ = true;             // a crash may have left one half done
   bool ending_ = false;
-  std::thread thread_;                           // last: started when everything above is there
+  std::thread thread_;  // last: started when everything above is there
 };
 
 }  // namespace colony::server

@@ -17,8 +17,8 @@ class FailingStore final : public server::Store {
   using JobRow = server::JobRow;
   explicit FailingStore(std::unique_ptr<server::Store> real) : real_(std::move(real)) {}
 
-  std::atomic<int> appends_until_failure{-1};   // so many appends succeed, then every one fails; negative: none fails
-  std::string engine_version_seen;              // not empty: in every row found by key; set before the service starts
+  std::atomic<int> appends_until_failure{-1};  // so many appends succeed, then every one fails; negative: none fails
+  std::string engine_version_seen;             // not empty: in every row found by key; set before the service starts
   void heal() { appends_until_failure = -1; }
 
   void append_events(server::EventBatch batch, std::function<void(const Status&)> committed) override {
@@ -51,7 +51,8 @@ class FailingStore final : public server::Store {
     return real_->create_job(job, queued_max);
   }
   Result<JobRow> find_job(const std::string& id) override { return real_->find_job(id); }
-  Result<server::JobPage> list_jobs(const server::JobFilter& filter, std::size_t limit, const std::string& cursor) override {
+  Result<server::JobPage> list_jobs(const server::JobFilter& filter, std::size_t limit,
+                                    const std::string& cursor) override {
     return real_->list_jobs(filter, limit, cursor);
   }
   Result<std::vector<std::uint64_t>> count_jobs() override { return real_->count_jobs(); }
@@ -66,7 +67,8 @@ class FailingStore final : public server::Store {
   Status delete_job(std::int64_t job_key) override { return real_->delete_job(job_key); }
   Result<std::vector<JobRow>> running_jobs() override { return real_->running_jobs(); }
   Status flush() override { return real_->flush(); }
-  Result<std::vector<Event>> read_events(std::int64_t job_key, const server::EventFilter& filter, std::size_t limit) override {
+  Result<std::vector<Event>> read_events(std::int64_t job_key, const server::EventFilter& filter,
+                                         std::size_t limit) override {
     return real_->read_events(job_key, filter, limit);
   }
   Result<std::uint64_t> seq_at(std::int64_t job_key, double at_h) override { return real_->seq_at(job_key, at_h); }
@@ -74,7 +76,8 @@ class FailingStore final : public server::Store {
   Status add_log(std::int64_t job_key, const std::string& level, const std::string& message) override {
     return real_->add_log(job_key, level, message);
   }
-  Result<std::vector<server::LogRow>> read_log(std::int64_t job_key, std::int64_t after_index, std::size_t limit) override {
+  Result<std::vector<server::LogRow>> read_log(std::int64_t job_key, std::int64_t after_index,
+                                               std::size_t limit) override {
     return real_->read_log(job_key, after_index, limit);
   }
 

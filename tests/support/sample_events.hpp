@@ -54,7 +54,8 @@ inline Event sample_event(std::uint64_t seq, EventBody body) {
 inline std::vector<Event> events_of_every_kind() {
   using Limits = std::numeric_limits<double>;
   std::vector<EventBody> bodies;
-  for (const std::uint32_t id : {1U, 2U, 3U, 4U, 5U, 6U, 7U, 4'294'967'295U}) bodies.push_back(Founded{sample_cell(id)});
+  for (const std::uint32_t id : {1U, 2U, 3U, 4U, 5U, 6U, 7U, 4'294'967'295U})
+    bodies.push_back(Founded{sample_cell(id)});
   Cell extreme = sample_cell(8);
   extreme.centre_um = {Limits::denorm_min(), -Limits::denorm_min(), Limits::min()};
   extreme.nucleus_um = {Limits::max(), Limits::lowest(), 1e308};

@@ -1,6 +1,4 @@
 // The job service over the real store and the real simulator: growth, commands, restarts, failures, views of the past.
-#include "server/jobs/service.hpp"
-
 #include <atomic>
 #include <condition_variable>
 #include <mutex>
@@ -9,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "engine/base/version.hpp"
+#include "server/jobs/service.hpp"
 #include "tests/support/failing_store.hpp"
 #include "tests/support/temp_dir.hpp"
 
@@ -25,7 +24,8 @@ Result<RunSpec> decode(const std::string& text) {
   spec.params = *preset("paper");
   unsigned long long seed = 0, cells = 0;
   int broken = 1;
-  if (std::sscanf(text.c_str(), "%llu %llu %d", &seed, &cells, &broken) < 2) return Error{ErrorCode::kInvalid, "not a spec"};
+  if (std::sscanf(text.c_str(), "%llu %llu %d", &seed, &cells, &broken) < 2)
+    return Error{ErrorCode::kInvalid, "not a spec"};
   spec.seed = seed;
   spec.until.cells = cells;
   if (broken == 0) spec.params.cycle.mean_h = -1.0;
@@ -186,7 +186,7 @@ TEST_F(JobsTest, CancelEndsARunningJob) {
   ASSERT_EQ(history.size(), cancelled->view.job.last_seq);
   EXPECT_EQ(std::get<Finished>(history.back().body).reason, FinishReason::kCancelled);
   EXPECT_EQ(history.back().digest, history[history.size() - 2].digest);
-  const auto end = service_->colony_at(id, std::nullopt);   // `finished` folds too
+  const auto end = service_->colony_at(id, std::nullopt);  // `finished` folds too
   ASSERT_TRUE(end) << end.error().message;
   EXPECT_EQ(end->colony->cells().size(), cancelled->view.job.cell_count);
   EXPECT_TRUE(service_->remove(id));
@@ -194,7 +194,7 @@ TEST_F(JobsTest, CancelEndsARunningJob) {
 }
 
 TEST_F(JobsTest, CancelsAQueuedJobWithoutARunner) {
-  const std::string id = submit(new_job(4, 10));            // not started: nobody takes it
+  const std::string id = submit(new_job(4, 10));  // not started: nobody takes it
   EXPECT_TRUE(service_->cancel(id)->changed);
   EXPECT_EQ(service_->show(id)->job.state, JobState::kCancelled);
   EXPECT_EQ(events(id).size(), 1U);
@@ -218,18 +218,21 @@ TEST_F(JobsTest, GoesOnAfterADrainWithTheSameBytes) {
   std::set<double> hours;
   const auto hourly = store_->read_series(service_->show(id)->job.job_key);
   for (const SeriesRow& row : *hourly) hours.insert(row.time_h);
-  EXPECT_EQ(hours.size(), static_cast<std::size_t>(service_->show(id)->job.time_h) + 1);   // none missing after a restart
+  EXPECT_EQ(hours.size(),
+            static_cast<std::size_t>(service_->show(id)->job.time_h) + 1);  // none missing after a restart
 }
 
 TEST_F(JobsTest, AWishOutlivesTheProcess) {
   const std::string to_cancel = submit(new_job(6, 30)), to_pause = submit(new_job(7, 30));
-  for (const JobCommand command : {JobCommand::kCancel, JobCommand::kPause}) {   // recorded, but no runner was there to hear it
+  for (const JobCommand command :
+       {JobCommand::kCancel, JobCommand::kPause}) {  // recorded, but no runner was there to hear it
     const std::int64_t job_key = (*store_->take_queued_job())->job_key;
     EXPECT_TRUE(store_->command_job(job_key, command)->pending);
   }
   start();
   EXPECT_EQ(Watch(*service_, to_cancel).until_ended().job.state, JobState::kCancelled);
-  const JobView paused = Watch(*service_, to_pause).until([](const JobView& v) { return v.job.state != JobState::kRunning; });
+  const JobView paused =
+      Watch(*service_, to_pause).until([](const JobView& v) { return v.job.state != JobState::kRunning; });
   EXPECT_EQ(paused.job.state, JobState::kPaused);
   EXPECT_EQ(paused.job.last_seq, 0U);
 }
@@ -282,9 +285,8 @@ TEST_F(JobsTest, AStorageErrorPausesAndHealsByItself) {
   store_->appends_until_failure = 2;
   const std::string id = submit(new_job(8, 40));
   Watch watch(*service_, id);
-  const JobView stopped = watch.until([](const JobView& view) {
-    return view.job.state == JobState::kPaused || is_terminal(view.job.state);
-  });
+  const JobView stopped = watch.until(
+      [](const JobView& view) { return view.job.state == JobState::kPaused || is_terminal(view.job.state); });
   EXPECT_EQ(stopped.job.state, JobState::kPaused);
   EXPECT_EQ(stopped.job.reason, "storage");
   store_->heal();

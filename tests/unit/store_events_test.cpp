@@ -1,11 +1,10 @@
 // The event log of the store: exactness, order, group commit, limits, and what a killed process leaves behind.
-#include <sys/wait.h>
-#include <unistd.h>
-
 #include <csignal>
 #include <cstring>
 #include <filesystem>
 #include <future>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <gtest/gtest.h>
 
@@ -80,7 +79,7 @@ TEST_F(StoreEventsTest, EveryKindComesBackAsItWent) {
   const EventBatch sent = batch;
   const auto finished = store_->finish_job(batch, JobState::kSucceeded, "exhausted", "");
   ASSERT_TRUE(finished) << finished.error().message;
-  for (int round = 0; round < 2; ++round) {            // the second time from the file
+  for (int round = 0; round < 2; ++round) {  // the second time from the file
     const auto read = store_->read_events(job_key_, {}, 1000);
     ASSERT_TRUE(read) << read.error().message;
     ASSERT_EQ(read->size(), sent.events.size());
@@ -105,7 +104,7 @@ TEST_F(StoreEventsTest, RefusesWhatItCouldNotKeepExactly) {
     ASSERT_FALSE(status);
     EXPECT_EQ(status.error().code, ErrorCode::kInternal);
     EXPECT_EQ(store_->find_job(job_key_)->last_seq, 0U);
-    EXPECT_TRUE(store_->read_events(job_key_, {}, 10)->empty());   // the whole batch, or nothing
+    EXPECT_TRUE(store_->read_events(job_key_, {}, 10)->empty());  // the whole batch, or nothing
   }
 }
 
@@ -136,20 +135,21 @@ TEST_F(StoreEventsTest, FiltersBySeqKindAndCell) {
 
 TEST_F(StoreEventsTest, FindsTheLastEventOfATime) {
   EXPECT_EQ(*store_->seq_at(job_key_, 5.0), 0U);
-  ASSERT_TRUE(append(*store_, sample_batch(job_key_, 1, 30)));       // times seq / 3
+  ASSERT_TRUE(append(*store_, sample_batch(job_key_, 1, 30)));  // times seq / 3
   EXPECT_EQ(*store_->seq_at(job_key_, 0.0), 0U);
   EXPECT_EQ(*store_->seq_at(job_key_, 5.0), 15U);
   EXPECT_EQ(*store_->seq_at(job_key_, 5.1), 15U);
   EXPECT_EQ(*store_->seq_at(job_key_, 1e9), 30U);
   EventBatch same = sample_batch(job_key_, 31, 3);
-  for (Event& event : same.events) event.time_h = 10.0;              // as event 30
+  for (Event& event : same.events) event.time_h = 10.0;  // as event 30
   ASSERT_TRUE(append(*store_, same));
   EXPECT_EQ(*store_->seq_at(job_key_, 10.0), 33U);
 }
 
 TEST_F(StoreEventsTest, KeepsSeriesWithTheEvents) {
   EventBatch batch = sample_batch(job_key_, 1, 3);
-  batch.series = {{0.0, 1, 1, 0, 0, 0.1, 0.0, 5.5, 95.0, 1e4}, {1.0, 2, 1, 1, 0, 1.0 / 3.0, 2.0 / 3.0, 7.5, 170.0, 1.1e4}};
+  batch.series = {{0.0, 1, 1, 0, 0, 0.1, 0.0, 5.5, 95.0, 1e4},
+                  {1.0, 2, 1, 1, 0, 1.0 / 3.0, 2.0 / 3.0, 7.5, 170.0, 1.1e4}};
   ASSERT_TRUE(append(*store_, batch));
   const auto rows = store_->read_series(job_key_);
   ASSERT_EQ(rows->size(), 2U);
@@ -171,7 +171,7 @@ TEST_F(StoreEventsTest, SeqStaysDense) {
 }
 
 TEST_F(StoreEventsTest, CallbacksComeInOrderAfterTheirCommit) {
-  std::vector<std::uint64_t> seen;                       // the writer thread's until flush() returns
+  std::vector<std::uint64_t> seen;  // the writer thread's until flush() returns
   for (std::uint64_t i = 0; i < 400; ++i) {
     store_->append_events(sample_batch(job_key_, 1 + 5 * i, 5), [&seen, i](const Status& status) {
       EXPECT_TRUE(status);
@@ -193,7 +193,7 @@ TEST_F(StoreEventsTest, FinishComesAfterWhatWasQueuedBefore) {
   const auto ended = store_->finish_job(last, JobState::kSucceeded, "time", "");
   ASSERT_TRUE(ended) << ended.error().message;
   EXPECT_EQ(ended->last_seq, 3001U);
-  EXPECT_EQ(append(*store_, sample_batch(job_key_, 3002, 1)).error().code, ErrorCode::kConflict);   // the end absorbs
+  EXPECT_EQ(append(*store_, sample_batch(job_key_, 3002, 1)).error().code, ErrorCode::kConflict);  // the end absorbs
 }
 
 TEST_F(StoreEventsTest, AnAppendLargerThanTheQueueStillGoesThrough) {
@@ -269,7 +269,7 @@ TEST(StoreCrash, WhatWasConfirmedIsThereAndDense) {
       const std::uint64_t first = 1 + 7 * i;
       store.append_events(sample_batch(job_key, first, 7), [&, last = first + 6](const Status& status) {
         if (!status || write(confirmed[1], &last, sizeof last) != sizeof last) _exit(5);
-        if (last > 700) kill(getpid(), SIGKILL);         // on the writer thread, with batches waiting behind
+        if (last > 700) kill(getpid(), SIGKILL);  // on the writer thread, with batches waiting behind
       });
     }
     (void)store.flush();
@@ -280,12 +280,12 @@ TEST(StoreCrash, WhatWasConfirmedIsThereAndDense) {
   close(confirmed[0]);
   EXPECT_GT(last_confirmed, 700U);
   auto store = open_store(dir.path());
-  ASSERT_TRUE(store) << store.error().message;             // the lock died with its process
+  ASSERT_TRUE(store) << store.error().message;  // the lock died with its process
   const auto running = (*store)->running_jobs();
   ASSERT_EQ(running->size(), 1U);
   const JobRow job = running->at(0);
   EXPECT_GE(job.last_seq, last_confirmed);
-  EXPECT_EQ(job.last_seq % 7, 0U);                         // batches are whole
+  EXPECT_EQ(job.last_seq % 7, 0U);  // batches are whole
   const auto events = (*store)->read_events(job.job_key, {}, 100'000);
   ASSERT_EQ(events->size(), job.last_seq);
   EXPECT_EQ(*events, sample_batch(job.job_key, 1, job.last_seq).events);
@@ -303,14 +303,14 @@ TEST(StoreCrash, ADeletionCutShortIsCompleted) {
     if (!store.delete_job(job_key)) _exit(7);
   });
   const std::uint64_t bytes = std::filesystem::file_size(dir.path() + "/colony.db");
-  ASSERT_GT(bytes, 1'000'000U);                            // the long log was moved into the file before the delete
+  ASSERT_GT(bytes, 1'000'000U);  // the long log was moved into the file before the delete
   auto store = open_store(dir.path(), bytes + bytes / 4);
   ASSERT_TRUE(store);
   EXPECT_TRUE((*store)->list_jobs({}, 10, "")->items.empty());
   // A second history as long as the first fits below this limit only where the first one was: the sweep must free its pages.
   const std::int64_t job_key = running_job(**store);
   Status status = Ok{};
-  for (int tries = 0; tries < 1000; ++tries) {             // every refused try leaves the sweeper an idle moment
+  for (int tries = 0; tries < 1000; ++tries) {  // every refused try leaves the sweeper an idle moment
     status = append(**store, sample_batch(job_key, 1, 20'000));
     if (status) break;
     ASSERT_EQ(status.error().code, ErrorCode::kStorage);

@@ -1,13 +1,12 @@
 // The store as its users see it: jobs, states, cursors, commands and deletion. Events and crashes: store_events_test.cpp.
 #include "server/store/store.hpp"
 
-#include <sys/stat.h>
-
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <latch>
 #include <set>
+#include <sys/stat.h>
 #include <thread>
 
 #include <gtest/gtest.h>
@@ -106,7 +105,8 @@ TEST_F(StoreTest, RefusesASecondOpenOfTheSameFolder) {
 
 TEST(StoreOpen, RefusesWhatIsNoDatabaseOfOurs) {
   const TempDir dir;
-  std::ofstream(dir.path() + "/colony.db") << "this is a text, and long enough not to be taken for an empty database file";
+  std::ofstream(dir.path() + "/colony.db")
+      << "this is a text, and long enough not to be taken for an empty database file";
   StoreConfig config;
   config.data_dir = dir.path();
   const auto store = Store::open(config);
@@ -150,7 +150,7 @@ TEST_F(StoreTest, AnIdempotencyKeyGivesTheSameJob) {
   job.idempotency_key = "key";
   job.body_hash = "one";
   const auto first = store_->create_job(job, 1);
-  const auto again = store_->create_job(job, 1);   // not kBusy: nothing new is queued
+  const auto again = store_->create_job(job, 1);  // not kBusy: nothing new is queued
   ASSERT_TRUE(first && again);
   EXPECT_TRUE(first->created);
   EXPECT_FALSE(again->created);
@@ -195,11 +195,11 @@ TEST_F(StoreTest, AFullQueueIsBusy) {
 
 TEST_F(StoreTest, StatesFollowTheTable) {
   const std::set<std::pair<JobState, JobState>> table = {
-      {JobState::kQueued, JobState::kRunning},    {JobState::kQueued, JobState::kPaused},
-      {JobState::kQueued, JobState::kCancelled},  {JobState::kQueued, JobState::kFailed},
-      {JobState::kRunning, JobState::kPaused},    {JobState::kRunning, JobState::kSucceeded},
-      {JobState::kRunning, JobState::kFailed},    {JobState::kRunning, JobState::kCancelled},
-      {JobState::kPaused, JobState::kQueued},     {JobState::kPaused, JobState::kCancelled}};
+      {JobState::kQueued, JobState::kRunning},   {JobState::kQueued, JobState::kPaused},
+      {JobState::kQueued, JobState::kCancelled}, {JobState::kQueued, JobState::kFailed},
+      {JobState::kRunning, JobState::kPaused},   {JobState::kRunning, JobState::kSucceeded},
+      {JobState::kRunning, JobState::kFailed},   {JobState::kRunning, JobState::kCancelled},
+      {JobState::kPaused, JobState::kQueued},    {JobState::kPaused, JobState::kCancelled}};
   for (const JobState from : kStates) {
     for (const JobState to : kStates) {
       SCOPED_TRACE(std::string(name_of(from)) + " -> " + std::string(name_of(to)));
@@ -217,7 +217,7 @@ TEST_F(StoreTest, StatesFollowTheTable) {
       if (!allowed) {
         EXPECT_EQ(moved.error().code, ErrorCode::kConflict);
       }
-      if (!is_terminal(after.state)) {   // so that the next round finds no queued job of this one
+      if (!is_terminal(after.state)) {  // so that the next round finds no queued job of this one
         ASSERT_TRUE(store_->finish_job(finishing(after, FinishReason::kCancelled), JobState::kCancelled, "", ""));
       }
     }
@@ -226,7 +226,8 @@ TEST_F(StoreTest, StatesFollowTheTable) {
 
 TEST_F(StoreTest, SetStateWantsOneOfTheStatesNamed) {
   const JobRow job = job_in(JobState::kRunning);
-  EXPECT_EQ(store_->set_state(job.job_key, {JobState::kQueued}, JobState::kPaused, "", "").error().code, ErrorCode::kConflict);
+  EXPECT_EQ(store_->set_state(job.job_key, {JobState::kQueued}, JobState::kPaused, "", "").error().code,
+            ErrorCode::kConflict);
   EXPECT_EQ(store_->set_state(77, {JobState::kQueued}, JobState::kPaused, "", "").error().code, ErrorCode::kNotFound);
   EXPECT_EQ(state_of(job.job_key), JobState::kRunning);
 }
@@ -236,7 +237,7 @@ TEST_F(StoreTest, CommandsDecideByTheStateTheyFind) {
   JobRow job = job_in(JobState::kQueued);
   EXPECT_EQ(command(job, JobCommand::kPause)->job.state, JobState::kPaused);
   EXPECT_FALSE(command(job, JobCommand::kPause)->changed);
-  EXPECT_FALSE(command(job, JobCommand::kResumeStorage)->changed);   // a person paused it
+  EXPECT_FALSE(command(job, JobCommand::kResumeStorage)->changed);  // a person paused it
   EXPECT_EQ(command(job, JobCommand::kResume)->job.state, JobState::kQueued);
   EXPECT_FALSE(command(job, JobCommand::kResume)->changed);
   const auto cancelled = command(job, JobCommand::kCancel);
@@ -253,7 +254,7 @@ TEST_F(StoreTest, CommandsDecideByTheStateTheyFind) {
   job = job_in(JobState::kRunning);
   EXPECT_TRUE(command(job, JobCommand::kPause)->pending);
   EXPECT_TRUE(command(job, JobCommand::kResume)->pending);
-  EXPECT_TRUE(command(job, JobCommand::kCancel)->pending);           // a cancel overrides a pause
+  EXPECT_TRUE(command(job, JobCommand::kCancel)->pending);  // a cancel overrides a pause
   EXPECT_EQ(store_->find_job(job.job_key)->command, "cancel");
   EXPECT_EQ(command(job, JobCommand::kPause).error().code, ErrorCode::kConflict);
   EXPECT_EQ(store_->set_state(job.job_key, {JobState::kRunning}, JobState::kPaused, "user", "").error().code,
@@ -297,8 +298,8 @@ TEST_F(StoreTest, ListsNewestFirstWithFiltersAndCursor) {
   } while (!cursor.empty());
   EXPECT_EQ(seen, ids);
   using Labels = std::vector<std::pair<std::string, std::string>>;
-  const auto count = [&](std::optional<JobState> state, std::optional<std::string> kind, std::optional<std::string> name,
-                         const Labels& labels) {
+  const auto count = [&](std::optional<JobState> state, std::optional<std::string> kind,
+                         std::optional<std::string> name, const Labels& labels) {
     return store_->list_jobs({state, kind, name, labels}, 100, "")->items.size();
   };
   EXPECT_EQ(count({}, {}, "even", {}), 4U);
@@ -319,7 +320,8 @@ TEST_F(StoreTest, RefusesEveryChangedCursor) {
   create();
   const std::string cursor = store_->list_jobs({}, 1, "")->next.value();
   ASSERT_TRUE(store_->list_jobs({}, 1, cursor));
-  std::vector<std::string> wrong = {"1", "x", cursor + "0", cursor.substr(1), std::string(32, '0'), std::string(32, 'f')};
+  std::vector<std::string> wrong = {
+      "1", "x", cursor + "0", cursor.substr(1), std::string(32, '0'), std::string(32, 'f')};
   for (std::size_t i = 0; i < cursor.size(); ++i) {
     for (const char c : {'0', '7', 'a', 'F', '-', '\0'}) {
       std::string changed = cursor;
@@ -336,7 +338,7 @@ TEST_F(StoreTest, RefusesEveryChangedCursor) {
   }
   store_.reset();
   store_ = open_store(dir_.path() + "/data");
-  EXPECT_TRUE(store_->list_jobs({}, 1, cursor));   // a cursor outlives a restart
+  EXPECT_TRUE(store_->list_jobs({}, 1, cursor));  // a cursor outlives a restart
 }
 
 TEST_F(StoreTest, KeepsALogForEachJob) {
@@ -365,13 +367,14 @@ TEST_F(StoreTest, DeletesOnlyEndedJobsAndNothingOfTheOthers) {
   ASSERT_TRUE(store_->take_queued_job());
   store_->append_events(sample_batch(job.job_key, 1, 3500), [](const Status& status) { EXPECT_TRUE(status); });
   ASSERT_TRUE(store_->flush());
-  ASSERT_TRUE(store_->finish_job(finishing(*store_->find_job(job.job_key), FinishReason::kCells), JobState::kSucceeded, "cells", ""));
+  ASSERT_TRUE(store_->finish_job(finishing(*store_->find_job(job.job_key), FinishReason::kCells), JobState::kSucceeded,
+                                 "cells", ""));
   ASSERT_TRUE(store_->delete_job(job.job_key));
   EXPECT_EQ(store_->find_job(job.id).error().code, ErrorCode::kNotFound);
   EXPECT_EQ(store_->read_events(job.job_key, {}, 1).error().code, ErrorCode::kNotFound);
   EXPECT_EQ(store_->delete_job(job.job_key).error().code, ErrorCode::kNotFound);
   EXPECT_EQ(store_->list_jobs({}, 10, "")->items.size(), 1U);
-  EXPECT_NE(store_->create_job(with_key, 10)->job.id, job.id);   // the key went with the job
+  EXPECT_NE(store_->create_job(with_key, 10)->job.id, job.id);  // the key went with the job
   EXPECT_EQ(store_->read_events(kept.job_key, {}, 100)->size(), 50U);
 }
 
