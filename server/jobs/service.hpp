@@ -24,6 +24,9 @@ struct JobsConfig {
   std::uint64_t cells_max = 1'000'000;     // per job; beyond: failed, reason "limit"
   std::uint64_t events_max = 50'000'000;   // per job; beyond: failed, reason "limit"
   std::size_t cached_colonies_max = 16;    // folded colonies kept for pictures and tables
+  std::int64_t command_wait_ms = 10'000;   // how long cancel and pause wait for the runner; then the view as it is
+  std::int64_t storage_retry_ms = 1'000;   // first pause after a storage error; doubles up to 64 times this
+  std::uint64_t free_bytes_min = 16'777'216;   // a job stopped by the disk goes on only with this much free
 };
 
 /// Where a job is now; for a live job fresher than its row (but never ahead of the last commit in `last_seq`).
@@ -83,8 +86,8 @@ class JobService {
   /// `points` rows in equal steps from 0 to the end (values after the last event <= t).
   virtual Result<std::vector<SeriesRow>> series(const std::string& id, std::size_t points) = 0;
 
-  /// Calls `wake` (any thread, must not block, may be spurious) after every commit, progress change (at most 5 a second)
-  /// and state change of the job, until the subscription is destroyed.
+  /// Calls `wake` (any thread, may be spurious; it must not block, call the service or end a subscription) after every commit
+  /// and every state change of the job, until the subscription is destroyed. Progress changes only with commits.
   class Subscription { public: virtual ~Subscription() = default; };
   virtual std::unique_ptr<Subscription> subscribe(std::int64_t job_key, std::function<void()> wake) = 0;
 

@@ -16,6 +16,12 @@ enum class JobState { kQueued, kRunning, kPaused, kSucceeded, kFailed, kCancelle
 std::string_view name_of(JobState state);
 std::optional<JobState> job_state_from(std::string_view name);
 bool is_terminal(JobState state);
+inline constexpr int kJobStateCount = 6;
+/// The table above: true if a job may go from `from` to `to` (never to itself).
+bool may_follow(JobState from, JobState to);
+
+/// What a person asks of a job. kResumeStorage is the service's own: it resumes only what stopped for reason "storage".
+enum class JobCommand { kCancel, kPause, kResume, kResumeStorage };
 
 /// What a client submitted, after validation, in the form that is stored. `spec_json` is the complete normalised job spec.
 struct NewJob {
@@ -38,6 +44,7 @@ struct JobRow {
   JobState state = JobState::kQueued;
   std::string reason;                      // why paused ("user", "storage") or how it ended; empty otherwise
   std::string detail;                      // for people: the message of a failure; empty otherwise
+  std::string command;                     // "cancel" or "pause": a durable wish that the runner has not carried out yet
   std::string submitted_by;
   std::string created_at, started_at, finished_at;   // RFC 3339 UTC with milliseconds; empty: not yet
   std::uint64_t revision = 1;              // grows with state, name, labels

@@ -24,6 +24,7 @@ struct StoreConfig {
   std::size_t batch_rows_max = 1000;        // a write batch closes at this many rows,
   std::int64_t batch_wait_ms = 50;          // this age, or at once when a request waits
   std::size_t queued_events_max = 20'000;   // a full queue makes append_events wait
+  std::uint64_t database_bytes_max = 0;     // of colony.db; beyond: kStorage. 0: as much as the disk holds
 };
 
 struct JobFilter {
@@ -71,12 +72,21 @@ class Store {
   virtual Result<std::vector<std::uint64_t>> count_jobs() = 0;
   /// Oldest queued job -> running, in one transaction; nullopt if none is queued.
   virtual Result<std::optional<JobRow>> take_queued_job() = 0;
-  /// Moves a job from one of `from` to `to`; kConflict (and no change) if its state is none of them. Adds a log line.
+  /// Moves a job from one of `from` to `to`; kConflict (and no change) if its state is none of them, if may_follow() forbids
+  /// it, if `to` is terminal (that is finish_job's), or if a recorded cancel waits. Clears the wish it fulfils. Adds a log line.
   virtual Result<JobRow> set_state(std::int64_t job_key, const std::vector<JobState>& from, JobState to,
                                    const std::string& reason, const std::string& detail) = 0;
   /// The `finished` event, the terminal state and its reason in one transaction, after all events appended before.
+  /// `last.events` ends with `finished`. kConflict if the job's state or last_seq does not fit.
   virtual Result<JobRow> finish_job(const EventBatch& last, JobState state, const std::string& reason,
                                     const std::string& detail) = 0;
+  /// One transaction decides by the state found in it, so no runner can come in between.
+  /// Cancel: queued and paused jobs end cancelled, with their `finished` event; of a running one the wish is recorded.
+  /// Pause: queued becomes paused ("user"), so does paused ("storage"); of a running one the wish is recorded.
+  /// Resume: paused becomes queued. Already there: changed = false. Another terminal state, or a wish that a recorded cancel
+  /// forbids: kConflict. `pending`: the job runs on until its runner has carried out job.command; then ask again.
+  struct Commanded { JobRow job; bool changed = true; bool pending = false; };
+  virtual Result<Commanded> command_job(std::int64_t job_key, JobCommand command) = 0;
   /// Only terminal jobs (else kConflict); events, placements, series and log go with it.
   virtual Status delete_job(std::int64_t job_key) = 0;
   /// Every job in state running (after a crash).
@@ -84,12 +94,15 @@ class Store {
 
   // --- events ---
   /// Queues a batch for the writer; waits while the queue is full. `committed` runs on the writer thread after the commit
-  /// (or with the error: then nothing of this batch was stored). Batches of a job commit in the order given.
+  /// (or with the error: then nothing of this batch was stored); it must not call the store. Batches of a job commit in the
+  /// order given; after a failed one the later ones fail too (kConflict), because seq stays dense. Only of running jobs.
   virtual void append_events(EventBatch batch, std::function<void(const Status&)> committed) = 0;
   /// Waits until everything queued before is committed.
   virtual Status flush() = 0;
   /// Up to `limit` events by ascending seq. Complete: placement and woken rows joined.
   virtual Result<std::vector<Event>> read_events(std::int64_t job_key, const EventFilter& filter, std::size_t limit) = 0;
+  /// The last seq whose event has time_h <= at_h; 0 if none.
+  virtual Result<std::uint64_t> seq_at(std::int64_t job_key, double at_h) = 0;
   /// The hourly rows, ascending.
   virtual Result<std::vector<SeriesRow>> read_series(std::int64_t job_key) = 0;
 

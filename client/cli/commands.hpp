@@ -1,0 +1,31 @@
+// commands: what `colony` can do. Each function declares its subcommands; the chosen one sets `action`, which app.cpp
+// then runs. Errors: Failure (failure.hpp). An action returns the exit code.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include <CLI/App.hpp>
+
+#include "client/cli/session.hpp"
+
+namespace colony::client {
+
+using Action = std::function<ExitCode()>;
+
+void add_job_commands(CLI::App& app, Session& session,
+                      Action& action);  // list counts show cancel pause resume delete info
+void add_submit_command(CLI::App& app, Session& session, Action& action);
+void add_watch_command(CLI::App& app, Session& session, Action& action);
+void add_data_commands(CLI::App& app, Session& session, Action& action);     // events cells log
+void add_picture_commands(CLI::App& app, Session& session, Action& action);  // series image
+void add_founders_command(CLI::App& app, Session& session, Action& action);
+
+/// Follows a job to its end. Exit code: kDone, kJobFailed or kCancelled by its state; kInterrupted leaves it running.
+ExitCode watch_job(Session& session, const std::string& id);
+
+/// An option's text as a number. Failure kUsage naming the option (CLI11 would read "010" as eight).
+std::int64_t integer_option(const std::string& option, const std::string& text);
+double number_option(const std::string& option, const std::string& text);
+
+}  // namespace colony::client

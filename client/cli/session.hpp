@@ -1,0 +1,39 @@
+// session: what every command shares: the environment, the global options, the connection (made when first used).
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "client/cli/environment.hpp"
+#include "client/cli/failure.hpp"
+#include "client/cli/http_client.hpp"
+#include "client/cli/text.hpp"
+
+namespace colony::client {
+
+struct Session {
+  explicit Session(Environment& environment) : env(environment) {}
+
+  Environment& env;
+  std::string server_flag;
+  bool json = false;
+
+  HttpClient& client();
+
+  /// Sends again, with growing delays, after a lost connection or a 429 or 503; says so on standard error. The last
+  /// answer or failure is the caller's. Only for requests that may be repeated.
+  HttpResponse send_patiently(const HttpRequest& request);
+
+ private:
+  std::unique_ptr<HttpClient> client_;
+};
+
+/// The full id for a full id (not looked up) or for the unique end of one, found in the server's list of jobs.
+/// Errors: kUsage for what cannot be an id or is ambiguous (the candidates are named), kRefused when no job ends so.
+std::string resolve_job_id(Session& session, const std::string& text);
+
+/// "/v1/jobs/<id>" plus `rest`.
+Target job_target(const std::string& id, const std::string& rest = {});
+
+}  // namespace colony::client

@@ -1,0 +1,69 @@
+// live: what is known of jobs at this moment: who watches them, what is asked of their runners, how fast they grow.
+// Promise: progress is that of the last commit; a watcher is woken after the commit, never before.
+// Threads: every function from any thread.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <set>
+
+#include "server/jobs/service.hpp"
+
+namespace colony::server {
+
+/// Wakes the watchers of a job.
+class Hub : public std::enable_shared_from_this<Hub> {
+ public:
+  std::unique_ptr<JobService::Subscription> subscribe(std::int64_t job_key, std::function<void()> wake);
+  /// Runs the wake functions of this job on the calling thread.
+  void announce(std::int64_t job_key);
+
+ private:
+  class Entry;
+  // Held while wake functions run: a subscription that is gone is never called. So they must not come back here.
+  std::mutex mutex_;  // guards everything below
+  std::map<std::int64_t, std::set<Entry*>> watchers_;
+};
+
+/// One job between the moment a runner takes it and the moment the runner leaves it.
+class LiveJob {
+ public:
+  enum class Wish : std::uint8_t { kNone, kDrain, kPause, kCancel };
+  explicit LiveJob(const JobRow& job);
+
+  /// Asks the runner to stop between two steps. A stronger wish (later in the list) replaces a weaker one.
+  void ask(Wish wish);
+  Wish wish() const { return wish_.load(std::memory_order_acquire); }
+
+  /// After a commit: `job` as stored.
+  void committed(const JobRow& job);
+  bool has_committed() const { return has_committed_.load(std::memory_order_acquire); }
+  Progress progress() const;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  struct Sample {
+    Clock::time_point at;
+    std::uint64_t cells;
+    double fraction;
+  };
+
+  std::atomic<Wish> wish_{Wish::kNone};
+  std::atomic<bool> has_committed_{false};
+  const std::optional<double> until_time_h_;  // fixed after construction
+  const std::optional<std::uint64_t> until_cells_;
+  mutable std::mutex mutex_;    // guards everything below
+  Progress last_;               // without rates
+  std::deque<Sample> samples_;  // of the last seconds, at most kSamplesMax
+};
+
+/// Progress as the row alone tells it (no rates).
+Progress progress_of(const JobRow& job);
+
+}  // namespace colony::server

@@ -1,0 +1,123 @@
+#include "server/jobs/past.hpp"
+
+#include <algorithm>
+#include <exception>
+#include <string>
+#include <utility>
+
+#include "engine/base/check.hpp"
+
+namespace colony::server {
+namespace {
+
+constexpr std::size_t kPage = 2000;
+constexpr std::size_t kSeriesMax = 32;
+
+/// Calls `use(event)` for every event with after < seq <= last, page by page.
+template <class Use>
+Status for_each_event(Store& store, std::int64_t job_key, std::uint64_t after, std::uint64_t last, Use use) {
+  EventFilter filter;
+  filter.after = after;
+  while (filter.after < last) {
+    const auto page = store.read_events(job_key, filter, std::min<std::uint64_t>(kPage, last - filter.after));
+    if (!page) return page.error();
+    if (page->empty()) return Error{ErrorCode::kInternal, "the stored history ends before its last event"};
+    for (const Event& event : *page) use(event);
+    filter.after = page->back().seq;
+  }
+  return Ok{};
+}
+
+Error does_not_fold(const JobRow& job, const std::exception& error) {
+  return {ErrorCode::kInternal, "the stored history of job " + job.id + " does not fold: " + error.what()};
+}
+
+}  // namespace
+
+Past::Past(Store& store, const SpecDecoder& decode, std::size_t colonies_max)
+    : store_(store), decode_(decode), colonies_max_(std::max<std::size_t>(colonies_max, 1)) {}
+
+Result<ColonyAt> Past::colony_after(const JobRow& job, std::uint64_t seq) {
+  std::shared_ptr<const Colony> start;
+  std::shared_ptr<const RunSpec> spec;
+  {
+    const std::lock_guard lock(mutex_);
+    auto best = colonies_.end();
+    for (auto kept = colonies_.begin(); kept != colonies_.end(); ++kept) {
+      if (kept->job_key != job.job_key || kept->seq > seq) continue;
+      if (best == colonies_.end() || kept->seq > best->seq) best = kept;
+    }
+    if (best != colonies_.end()) {
+      colonies_.splice(colonies_.begin(), colonies_, best);
+      start = best->colony;
+      spec = best->spec;
+      if (best->seq == seq) return ColonyAt{start, spec, start->time_h(), start->digest()};
+    }
+  }
+  if (spec == nullptr) {
+    auto decoded = decode_(job.spec_json);
+    if (!decoded) return Error{ErrorCode::kInternal, "the stored spec cannot be used: " + decoded.error().message};
+    spec = std::make_shared<const RunSpec>(std::move(*decoded));
+  }
+  try {
+    auto colony = start != nullptr ? std::make_shared<Colony>(*start) : std::make_shared<Colony>(spec->params);
+    const Status folded =
+        for_each_event(store_, job.job_key, colony->last_seq(), seq, [&](const Event& event) { colony->apply(event); });
+    if (!folded) return folded.error();
+    const std::lock_guard lock(mutex_);
+    colonies_.push_front({job.job_key, seq, colony, spec});
+    if (colonies_.size() > colonies_max_) colonies_.pop_back();
+    return ColonyAt{colony, spec, colony->time_h(), colony->digest()};
+  } catch (const std::exception& error) {
+    return does_not_fold(job, error);
+  }
+}
+
+Result<std::vector<SeriesRow>> Past::series(const JobRow& job, std::size_t points) {
+  {
+    const std::lock_guard lock(mutex_);
+    for (auto kept = series_.begin(); kept != series_.end(); ++kept) {
+      if (kept->job_key != job.job_key || kept->last_seq != job.last_seq || kept->points != points) continue;
+      series_.splice(series_.begin(), series_, kept);
+      return kept->rows;
+    }
+  }
+  const auto spec = decode_(job.spec_json);
+  if (!spec) return Error{ErrorCode::kInternal, "the stored spec cannot be used: " + spec.error().message};
+  const double end_h = job.time_h;
+  const std::size_t count = end_h > 0.0 ? points : 1;
+  const auto time_of = [&](std::size_t k) {
+    return k + 1 == count ? end_h : end_h * static_cast<double>(k) / static_cast<double>(count - 1);
+  };
+  std::vector<SeriesRow> rows;
+  try {
+    Colony colony(spec->params);
+    std::optional<SeriesRow> measured;  // of the colony as it is now
+    const auto add_row = [&] {
+      if (!measured) measured = measure_series(colony, 0.0);
+      measured->time_h = time_of(rows.size());
+      rows.push_back(*measured);
+    };
+    const Status folded = for_each_event(store_, job.job_key, 0, job.last_seq, [&](const Event& event) {
+      while (rows.size() < count && time_of(rows.size()) < event.time_h) add_row();
+      colony.apply(event);
+      if (event.kind() != EventKind::kFinished) measured.reset();
+    });
+    if (!folded) return folded.error();
+    while (rows.size() < count) add_row();
+  } catch (const std::exception& error) {
+    return does_not_fold(job, error);
+  }
+  const std::lock_guard lock(mutex_);
+  series_.push_front({job.job_key, job.last_seq, points, rows});
+  if (series_.size() > kSeriesMax) series_.pop_back();
+  return rows;
+}
+
+void Past::forget(std::int64_t job_key) {
+  const std::lock_guard lock(mutex_);
+  colonies_.remove_if([&](const KeptColony& kept) { return kept.job_key == job_key; });
+  series_.remove_if([&](const KeptSeries& kept) { return kept.job_key == job_key; });
+}
+
+}  // namespace colony::server

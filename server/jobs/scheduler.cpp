@@ -1,0 +1,186 @@
+// The threads of LocalJobService: runners that take jobs, and one that brings back jobs stopped by the store.
+#include <algorithm>
+#include <utility>
+
+#include "server/jobs/local_service.hpp"
+
+namespace colony::server {
+namespace {
+constexpr int kPauseDoublings = 64;  // the longest pause between two tries, in first pauses
+}  // namespace
+
+LocalJobService::LocalJobService(Store& store, JobsConfig config, SpecDecoder decode)
+    : store_(store),
+      config_(config),
+      decode_(std::move(decode)),
+      past_(store_, decode_, config_.cached_colonies_max),
+      environment_{store_, config_, decode_, *hub_} {}
+
+LocalJobService::~LocalJobService() { drain(); }
+
+Status LocalJobService::start() {
+  auto running = store_.running_jobs();
+  if (!running) return running.error();
+  JobFilter paused;
+  paused.state = JobState::kPaused;
+  std::vector<std::int64_t> storage_paused;
+  std::string cursor;
+  for (;;) {
+    const auto page = store_.list_jobs(paused, 1000, cursor);
+    if (!page) return page.error();
+    for (const JobRow& job : page->items) {
+      if (job.reason == "storage") storage_paused.push_back(job.job_key);
+    }
+    if (!page->next) break;
+    cursor = *page->next;
+  }
+  const std::lock_guard lock(mutex_);
+  if (draining_ || !threads_.empty()) return Error{ErrorCode::kConflict, "the service was started before"};
+  for (JobRow& job : *running) running_before_.push_back(std::move(job));
+  for (const std::int64_t job_key : storage_paused) stalled_[job_key] = {std::chrono::milliseconds(0), Clock::now()};
+  for (std::size_t i = 0; i < std::max<std::size_t>(config_.concurrent_max, 1); ++i) {
+    threads_.emplace_back([this] { run_loop(); });
+  }
+  threads_.emplace_back([this] { retry_loop(); });
+  return Ok{};
+}
+
+void LocalJobService::drain() {
+  std::vector<std::thread> threads;
+  {
+    const std::lock_guard take_lock(take_mutex_);  // so that no job is between store and live_
+    const std::lock_guard lock(mutex_);
+    draining_ = true;
+    for (const auto& [job_key, live] : live_) live->ask(LiveJob::Wish::kDrain);
+    threads = std::exchange(threads_, {});
+  }
+  changed_.notify_all();
+  for (std::thread& thread : threads) thread.join();
+  (void)store_.flush();  // a store that cannot commit has told the runners so
+}
+
+void LocalJobService::nudge_runners() {
+  {
+    const std::lock_guard lock(mutex_);
+    ++nudges_;
+  }
+  changed_.notify_all();
+}
+
+Result<std::pair<JobRow, std::shared_ptr<LiveJob>>> LocalJobService::take() {
+  const std::lock_guard take_lock(take_mutex_);
+  std::optional<JobRow> job;
+  {
+    const std::lock_guard lock(mutex_);
+    if (draining_) return std::pair<JobRow, std::shared_ptr<LiveJob>>{};
+    if (!running_before_.empty()) {
+      job = std::move(running_before_.front());
+      running_before_.pop_front();
+    }
+  }
+  if (!job) {
+    auto taken = store_.take_queued_job();
+    if (!taken) return taken.error();
+    job = std::move(*taken);
+  }
+  if (!job) return std::pair<JobRow, std::shared_ptr<LiveJob>>{};
+  auto live = std::make_shared<LiveJob>(*job);
+  const std::lock_guard lock(mutex_);
+  live_[job->job_key] = live;
+  return std::pair{std::move(*job), std::move(live)};
+}
+
+void LocalJobService::run_loop() {
+  for (;;) {
+    std::uint64_t nudges = 0;
+    {
+      const std::lock_guard lock(mutex_);
+      if (draining_) return;
+      nudges = nudges_;
+    }
+    const auto taken = take();
+    if (!taken || taken->second == nullptr) {
+      std::unique_lock lock(mutex_);
+      const auto work = [&] { return draining_ || nudges_ != nudges || !running_before_.empty(); };
+      if (taken) {
+        changed_.wait(lock, work);
+      } else {  // the store could not say: ask again later
+        changed_.wait_for(lock, std::chrono::milliseconds(config_.storage_retry_ms), work);
+      }
+      continue;
+    }
+    const auto& [job, live] = *taken;
+    hub_->announce(job.job_key);
+    const RunEnd end = run_job(environment_, job, live);
+    if (end == RunEnd::kStorage) stall(job, live->has_committed());
+    {
+      const std::lock_guard lock(mutex_);
+      live_.erase(job.job_key);
+      if (end != RunEnd::kStorage) last_pause_.erase(job.job_key);
+    }
+    changed_.notify_all();
+    hub_->announce(job.job_key);
+  }
+}
+
+void LocalJobService::stall(const JobRow& job, bool made_progress) {
+  // May fail as everything else does now; then view_of() tells it, and the next try starts from `running`.
+  (void)store_.set_state(job.job_key, {JobState::kRunning}, JobState::kPaused, "storage",
+                         "the database refused events");
+  const std::lock_guard lock(mutex_);
+  const std::chrono::milliseconds first(config_.storage_retry_ms);
+  std::chrono::milliseconds& pause = last_pause_[job.job_key];
+  pause = made_progress || pause.count() == 0 ? first : std::min(2 * pause, kPauseDoublings * first);
+  stalled_[job.job_key] = {pause, Clock::now() + pause};
+}
+
+void LocalJobService::retry_loop() {
+  std::unique_lock lock(mutex_);
+  while (!draining_) {
+    const auto next = std::min_element(stalled_.begin(), stalled_.end(), [](const auto& a, const auto& b) {
+      return a.second.retry_at < b.second.retry_at;
+    });
+    if (next == stalled_.end()) {
+      changed_.wait(lock);
+      continue;
+    }
+    if (Clock::now() < next->second.retry_at) {
+      changed_.wait_until(lock, next->second.retry_at);
+      continue;
+    }
+    const std::int64_t job_key = next->first;
+    lock.unlock();
+    const bool back = retry(job_key);
+    lock.lock();
+    if (back) {
+      stalled_.erase(job_key);
+      ++nudges_;
+    } else {
+      const std::chrono::milliseconds first(config_.storage_retry_ms);
+      Stalled& stalled = stalled_[job_key];
+      stalled.pause = stalled.pause.count() == 0 ? first : std::min(2 * stalled.pause, kPauseDoublings * first);
+      stalled.retry_at = Clock::now() + stalled.pause;
+    }
+    lock.unlock();
+    changed_.notify_all();
+    hub_->announce(job_key);
+    lock.lock();
+  }
+}
+
+bool LocalJobService::retry(std::int64_t job_key) {
+  const auto job = store_.find_job(job_key);
+  if (!job) return job.error().code == ErrorCode::kNotFound;
+  if (is_terminal(job->state)) return true;
+  if (!store_.check_writable(config_.free_bytes_min)) return false;
+  if (job->state == JobState::kRunning) {
+    const std::lock_guard lock(mutex_);
+    running_before_.push_back(*job);
+    return true;
+  }
+  const auto resumed =
+      store_.command_job(job_key, JobCommand::kResumeStorage);  // leaves it alone if a person paused it
+  return resumed || resumed.error().code == ErrorCode::kConflict;
+}
+
+}  // namespace colony::server

@@ -1,0 +1,23 @@
+// identity: names that the store gives: job ids, cursors, wall times.
+// Threads: pure but for the clock and the system's randomness.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace colony::server {
+
+/// Now, RFC 3339 UTC with milliseconds: 2026-11-22T05:36:07.123Z.
+std::string wall_time_text();
+
+/// A new UUID of version 7, lower case: milliseconds since 1970, then 74 random bits.
+std::string new_job_id();
+
+/// A place in the list of jobs as 32 hex digits: the key, and a hash of it with this database's salt, so that a cursor that
+/// the store did not give is refused instead of being taken for another place.
+std::string cursor_text(std::int64_t job_key, std::int64_t salt);
+std::optional<std::int64_t> cursor_key(std::string_view text, std::int64_t salt);
+
+}  // namespace colony::server

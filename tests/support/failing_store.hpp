@@ -1,0 +1,89 @@
+// failing_store: a real store whose appends can be made to fail, as on a full disk, and healed again.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/store/store.hpp"
+
+namespace colony::tests {
+
+class FailingStore final : public server::Store {
+ public:
+  using JobRow = server::JobRow;
+  explicit FailingStore(std::unique_ptr<server::Store> real) : real_(std::move(real)) {}
+
+  std::atomic<int> appends_until_failure{-1};  // so many appends succeed, then every one fails; negative: none fails
+  std::string engine_version_seen;             // not empty: in every row found by key; set before the service starts
+  void heal() { appends_until_failure = -1; }
+
+  void append_events(server::EventBatch batch, std::function<void(const Status&)> committed) override {
+    int left = appends_until_failure;
+    while (left > 0 && !appends_until_failure.compare_exchange_weak(left, left - 1)) {
+    }
+    if (left == 0) {
+      committed(full());
+    } else {
+      real_->append_events(std::move(batch), std::move(committed));
+    }
+  }
+  Result<JobRow> finish_job(const server::EventBatch& last, server::JobState state, const std::string& reason,
+                            const std::string& detail) override {
+    if (appends_until_failure == 0) return full();
+    return real_->finish_job(last, state, reason, detail);
+  }
+  Status check_writable(std::uint64_t free_bytes_min) override {
+    if (appends_until_failure == 0) return full();
+    return real_->check_writable(free_bytes_min);
+  }
+  Result<JobRow> find_job(std::int64_t job_key) override {
+    auto job = real_->find_job(job_key);
+    if (job && !engine_version_seen.empty()) job->engine_version = engine_version_seen;
+    return job;
+  }
+
+  // The rest is the real store's.
+  Result<Submitted> create_job(const server::NewJob& job, std::size_t queued_max) override {
+    return real_->create_job(job, queued_max);
+  }
+  Result<JobRow> find_job(const std::string& id) override { return real_->find_job(id); }
+  Result<server::JobPage> list_jobs(const server::JobFilter& filter, std::size_t limit,
+                                    const std::string& cursor) override {
+    return real_->list_jobs(filter, limit, cursor);
+  }
+  Result<std::vector<std::uint64_t>> count_jobs() override { return real_->count_jobs(); }
+  Result<std::optional<JobRow>> take_queued_job() override { return real_->take_queued_job(); }
+  Result<JobRow> set_state(std::int64_t job_key, const std::vector<server::JobState>& from, server::JobState to,
+                           const std::string& reason, const std::string& detail) override {
+    return real_->set_state(job_key, from, to, reason, detail);
+  }
+  Result<Commanded> command_job(std::int64_t job_key, server::JobCommand command) override {
+    return real_->command_job(job_key, command);
+  }
+  Status delete_job(std::int64_t job_key) override { return real_->delete_job(job_key); }
+  Result<std::vector<JobRow>> running_jobs() override { return real_->running_jobs(); }
+  Status flush() override { return real_->flush(); }
+  Result<std::vector<Event>> read_events(std::int64_t job_key, const server::EventFilter& filter,
+                                         std::size_t limit) override {
+    return real_->read_events(job_key, filter, limit);
+  }
+  Result<std::uint64_t> seq_at(std::int64_t job_key, double at_h) override { return real_->seq_at(job_key, at_h); }
+  Result<std::vector<SeriesRow>> read_series(std::int64_t job_key) override { return real_->read_series(job_key); }
+  Status add_log(std::int64_t job_key, const std::string& level, const std::string& message) override {
+    return real_->add_log(job_key, level, message);
+  }
+  Result<std::vector<server::LogRow>> read_log(std::int64_t job_key, std::int64_t after_index,
+                                               std::size_t limit) override {
+    return real_->read_log(job_key, after_index, limit);
+  }
+
+ private:
+  static Error full() { return {ErrorCode::kStorage, "the disk is full (a test says so)"}; }
+  const std::unique_ptr<server::Store> real_;
+};
+
+}  // namespace colony::tests
