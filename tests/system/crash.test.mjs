@@ -1,6 +1,7 @@
 // crash: kill -9 at any moment costs nothing: the history goes on from the stored events and comes out as if undisturbed.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
+import { statSync } from 'node:fs';
 import { join } from 'node:path';
 import test from 'node:test';
 import { command, finishedJob, reached, show, submit, terminal } from './harness/jobs.mjs';
@@ -104,6 +105,14 @@ test('DATA belongs to one server', async (t) => {
   await first.kill();
   const third = await startServer(t, { data: first.data });
   assert.equal((await third.get('/readyz')).status, 200, 'a dead server leaves no lock behind');
+});
+
+test('a new DATA is private, and its database says its version', async (t) => {
+  const data = join(temporaryFolder(t), 'new');
+  await startServer(t, { data });
+  assert.equal(statSync(data).mode & 0o777, 0o700);
+  const version = execFileSync('sqlite3', ['-batch', `file:${join(data, 'colony.db')}?mode=ro`, 'pragma user_version'], { encoding: 'utf8' });
+  assert.ok(Number(version) >= 1, version);
 });
 
 test('a server that cannot serve says why and ends', async (t) => {
