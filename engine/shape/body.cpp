@@ -91,9 +91,9 @@ Body::Body(const BodyGeometry& geometry, const NoiseParams& noise)
   // Covariance-like form S = R diag(s^2) R^T: half extents are the roots of its diagonal, its upper 2x2 block is the shadow's.
   Mat3 form = Mat3::Zero();
   for (int i = 0; i < 3; ++i) form += (semiaxes_[i] * semiaxes_[i]) * (axes.col(i) * axes.col(i).transpose());
-  const double scale = std::sqrt(1.0 + noise_bound_);
+  noisy_scale_ = std::sqrt(1.0 + noise_bound_);
   for (int i = 0; i < 3; ++i) {
-    const double half = scale * std::sqrt(form(i, i));
+    const double half = noisy_scale_ * std::sqrt(form(i, i));
     box_.low[i] = centre_[i] - half;
     box_.high[i] = centre_[i] + half;
   }
@@ -131,6 +131,16 @@ double Body::half_width_um(const Vec3& unit) const {
   return std::sqrt(sum);
 }
 
+bool separated(const Body& a, const Body& b) {
+  const Vec3 apart = b.centre_um() - a.centre_um();
+  const double distance = std::sqrt(apart.squaredNorm());
+  if (!(distance > 0.0)) return false;
+  const Vec3 unit = apart / distance;
+  // Both lie inside their scaled ellipsoids, whose half widths along the line of centres must add up to reach. The margin is
+  // for rounding alone.
+  return distance > 1.000001 * (a.noisy_scale() * a.half_width_um(unit) + b.noisy_scale() * b.half_width_um(unit));
+}
+
 bool Body::footprint_contains(double x_um, double y_um) const {
   const double dx = x_um - centre_.x();
   const double dy = y_um - centre_.y();
@@ -142,17 +152,38 @@ Vec2 Body::footprint_half_extent_um() const {
   return {std::sqrt(footprint_yy_ / determinant), std::sqrt(footprint_xx_ / determinant)};
 }
 
-double volume_above_dish_um3(const BodyGeometry& geometry) {
-  const Mat3 axes = rotation_matrix(geometry.rotation_rad);
-  double half_height2 = 0.0;
-  for (int i = 0; i < 3; ++i) {
-    const double along = axes(2, i) * geometry.semiaxes_um[i];
-    half_height2 += along * along;
+namespace {
+
+// How the dish cuts an ellipsoid. An affine map makes the ellipsoid a unit ball and the dish a plane at distance -d from its centre.
+struct DishCut {
+  double d = 0.0;                  // height of the centre over the half height, clamped to [-1, 1]
+  Vec3 top_um = Vec3::Zero();      // from the centre to the highest point
+  explicit DishCut(const BodyGeometry& geometry) {
+    const Mat3 axes = rotation_matrix(geometry.rotation_rad);
+    Vec3 form_z = Vec3::Zero();    // R diag(s^2) R^T e_z
+    for (int i = 0; i < 3; ++i) {
+      form_z += (geometry.semiaxes_um[i] * geometry.semiaxes_um[i] * axes(2, i)) * Vec3(axes.col(i));
+    }
+    const double half_height = std::sqrt(form_z.z());
+    top_um = form_z / half_height;
+    d = std::clamp(geometry.centre_um.z() / half_height, -1.0, 1.0);
   }
-  // An affine map makes the ellipsoid a unit ball and the dish a plane at -d: a ball cut by a plane, its share by Archimedes.
-  const double d = std::clamp(geometry.centre_um.z() / std::sqrt(half_height2), -1.0, 1.0);
-  const double share = (2.0 + 3.0 * d - d * d * d) / 4.0;
+};
+
+}  // namespace
+
+double volume_above_dish_um3(const BodyGeometry& geometry) {
+  const double d = DishCut(geometry).d;
+  const double share = (2.0 + 3.0 * d - d * d * d) / 4.0;  // of a ball cut by a plane (Archimedes)
   return share * 4.0 / 3.0 * maths::kPi * geometry.semiaxes_um.x() * geometry.semiaxes_um.y() * geometry.semiaxes_um.z();
+}
+
+Vec3 centroid_above_dish_um(const BodyGeometry& geometry) {
+  const DishCut cut(geometry);
+  const double below = 2.0 + 3.0 * cut.d - cut.d * cut.d * cut.d;
+  if (!(below > 0.0)) return geometry.centre_um;  // all of it under the dish: no centroid
+  const double one_minus = 1.0 - cut.d * cut.d;
+  return geometry.centre_um + (0.75 * one_minus * one_minus / below) * cut.top_um;
 }
 
 double deformed_field(const Body& body, std::span<const Body* const> neighbours, ContactRule rule, const Vec3& point_um) {

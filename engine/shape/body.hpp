@@ -65,6 +65,7 @@ class Body {
   const Vec3& noise_offset() const { return noise_offset_; }
   const NoiseParams& noise() const { return noise_; }
   double noise_bound() const { return noise_bound_; }
+  double noisy_scale() const { return noisy_scale_; }
 
  private:
   Vec3 centre_ = Vec3::Zero();
@@ -73,9 +74,13 @@ class Body {
   Vec3 noise_offset_ = Vec3::Zero();
   NoiseParams noise_;
   double noise_bound_ = 0.0;
+  double noisy_scale_ = 1.0;                   // sqrt(1 + bound): the noisy body lies inside the ellipsoid scaled by this
   Box box_;
   double footprint_xx_ = 1.0, footprint_xy_ = 0.0, footprint_yy_ = 1.0;  // inverse of the shadow's 2x2 form
 };
+
+/// True if a plane across the line of centres separates the two noisy bodies: then they share no point. (False proves nothing.)
+bool separated(const Body& a, const Body& b);
 
 /// Gardner's series at (u, v, w), offset not added; |noise| <= noise_bound(params).
 double gardner_noise(double u, double v, double w, const NoiseParams& params);
@@ -84,6 +89,8 @@ double noise_period(const NoiseParams& params);
 
 /// Volume of the noise-free ellipsoid above the dish, um^3, analytic.
 double volume_above_dish_um3(const BodyGeometry& geometry);
+/// Its centroid, um, analytic: where the nucleus of a new cell stands.
+Vec3 centroid_above_dish_um(const BodyGeometry& geometry);
 
 /// f~ at p: f minus what the neighbours take there. `rule` kSum: sum over max(0, f_j), the paper's; kMax: the largest only.
 double deformed_field(const Body& body, std::span<const Body* const> neighbours, ContactRule rule, const Vec3& point_um);

@@ -2,6 +2,9 @@
 // Threads: exclusive.
 #pragma once
 
+#include <array>
+#include <cstdint>
+#include <limits>
 #include <optional>
 #include <set>
 #include <vector>
@@ -33,11 +36,13 @@ class Agenda {
   const std::set<AgendaItem>& items() const { return items_; }
 
  private:
+  static constexpr double kNever = std::numeric_limits<double>::infinity();
+  using DueTimes = std::array<double, 3>;     // by DueKind; kNever: nothing
+
   void refresh(const Cell& cell);
-  void drop(CellId id);
 
   std::set<AgendaItem> items_;
-  std::vector<std::vector<AgendaItem>> of_cell_;   // by id.value - 1; at most one item of each kind
+  std::vector<DueTimes> due_of_cell_;         // by id.value - 1; what items_ holds
 };
 
 }  // namespace colony

@@ -55,8 +55,6 @@ class Simulator {
   const RunSpec& spec() const { return spec_; }
 
  private:
-  Event decide_founded() const;
-  Event decide(const AgendaItem& item) const;
   std::optional<FinishReason> reason_to_finish() const;
   Event commit(Event event);
 

@@ -28,52 +28,19 @@ struct Placement {
   }
 };
 
+// Buffers grow and never shrink: shrinking and growing again would clear them each time.
+void hold(std::vector<float>& buffer, std::size_t n) {
+  if (buffer.size() < n + kernel::kPadding) buffer.resize(n + kernel::kPadding);
+}
+
 void place(const Placement& placement, const PointSet& points, OverlapScratch& s) {
   const std::size_t n = points.size();
-  s.x.resize(n);
-  s.y.resize(n);
-  s.z.resize(n);
+  hold(s.x, n);
+  hold(s.y, n);
+  hold(s.z, n);
   for (std::size_t i = 0; i < n; ++i) s.x[i] = placement.low[0] + points.x[i] * placement.extent[0];
   for (std::size_t i = 0; i < n; ++i) s.y[i] = placement.low[1] + points.y[i] * placement.extent[1];
   for (std::size_t i = 0; i < n; ++i) s.z[i] = placement.low[2] + points.z[i] * placement.extent[2];
-}
-
-// is_inside[i] for n points: the sign of f, the noise only inside the band. Returns how many are inside.
-std::uint32_t classify(const FloatBody& body, const float* x, const float* y, const float* z, std::size_t n, OverlapScratch& s) {
-  s.smooth.resize(n);
-  s.is_inside.resize(n);
-  s.band_index.resize(n);
-  kernel::smooth_field(body, x, y, z, n, s.smooth.data());
-  std::size_t band_count = 0;
-  std::uint32_t count = 0;
-  for (std::size_t i = 0; i < n; ++i) {
-    const float f = s.smooth[i];
-    const bool inside = f > body.band;
-    s.is_inside[i] = inside ? 1 : 0;
-    count += inside ? 1U : 0U;
-    s.band_index[band_count] = static_cast<std::uint32_t>(i);  // kept only if the next line counts it
-    band_count += (f <= body.band && f >= -body.band) ? 1U : 0U;
-  }
-  if (band_count == 0) return count;
-  s.band_u.resize(n);
-  s.band_v.resize(n);
-  s.band_w.resize(n);
-  s.band_smooth.resize(n);
-  for (std::size_t k = 0; k < band_count; ++k) {
-    const std::size_t i = s.band_index[k];
-    const kernel::Unit p = kernel::to_unit(body, x[i], y[i], z[i]);
-    s.band_u[k] = p.u;
-    s.band_v[k] = p.v;
-    s.band_w[k] = p.w;
-  }
-  kernel::noise(body, s.band_u.data(), s.band_v.data(), s.band_w.data(), band_count, s.band_smooth.data());
-  for (std::size_t k = 0; k < band_count; ++k) {
-    const std::size_t i = s.band_index[k];
-    const bool inside = s.smooth[i] + s.band_smooth[k] >= 0.0F;
-    s.is_inside[i] = inside ? 1 : 0;
-    count += inside ? 1U : 0U;
-  }
-  return count;
 }
 
 bool beyond_wall(const Placement& placement, double wall_radius_um, float x, float y) {
@@ -110,26 +77,22 @@ void count_overlaps(const Body& body, std::span<const Body* const> neighbours, s
 
   const Placement placement(body.box());
   place(placement, points, s);
-  out.hit_count = classify(FloatBody(body, placement.origin), s.x.data(), s.y.data(), s.z.data(), n, s);
-  s.inside_x.resize(n + 1);
-  s.inside_y.resize(n + 1);
-  s.inside_z.resize(n + 1);
-  std::size_t inside = 0;
-  for (std::size_t i = 0; i < n; ++i) {  // branch-free compaction: the slot is overwritten unless the point is inside
-    s.inside_x[inside] = s.x[i];
-    s.inside_y[inside] = s.y[i];
-    s.inside_z[inside] = s.z[i];
-    inside += s.is_inside[i];
-  }
+  hold(s.inside_x, n);
+  hold(s.inside_y, n);
+  hold(s.inside_z, n);
+  out.hit_count = kernel::select_inside(FloatBody(body, placement.origin), s.x.data(), s.y.data(), s.z.data(), n, s.band,
+                                        s.inside_x.data(), s.inside_y.data(), s.inside_z.data());
+  if (out.hit_count == 0) return;
   if (wall_radius_um) {
-    for (std::size_t i = 0; i < inside; ++i) {
+    for (std::size_t i = 0; i < out.hit_count; ++i) {
       if (beyond_wall(placement, *wall_radius_um, s.inside_x[i], s.inside_y[i])) ++out.outside_wall_count;
     }
   }
   for (std::size_t j = 0; j < neighbours.size(); ++j) {
-    if (!meets(neighbours[j]->box(), body.box())) continue;
+    if (!meets(neighbours[j]->box(), body.box()) || separated(*neighbours[j], body)) continue;
     const FloatBody other(*neighbours[j], placement.origin);
-    out.shared_counts[j] = classify(other, s.inside_x.data(), s.inside_y.data(), s.inside_z.data(), inside, s);
+    out.shared_counts[j] =
+        kernel::count_inside(other, s.inside_x.data(), s.inside_y.data(), s.inside_z.data(), out.hit_count, s.band);
   }
 }
 
@@ -142,13 +105,7 @@ OverlapCounts count_overlaps_reference(const Body& body, std::span<const Body* c
   if (body.box().empty()) return out;
   const Placement placement(body.box());
   const auto inside = [&](const Body& which, float x, float y, float z) {
-    const FloatBody prepared(which, placement.origin);
-    const kernel::Unit p = kernel::to_unit(prepared, x, y, z);
-    float noise = 0.0F;
-    float smooth = 0.0F;
-    kernel::smooth_field(prepared, &x, &y, &z, 1, &smooth);
-    kernel::noise(prepared, &p.u, &p.v, &p.w, 1, &noise);
-    return smooth + noise >= 0.0F;
+    return kernel::is_inside_reference(FloatBody(which, placement.origin), x, y, z);
   };
   for (std::size_t i = 0; i < points.size(); ++i) {
     const float x = placement.low[0] + points.x[i] * placement.extent[0];

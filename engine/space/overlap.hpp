@@ -15,6 +15,7 @@
 
 #include "engine/random/sobol.hpp"
 #include "engine/shape/body.hpp"
+#include "engine/space/overlap_kernel.hpp"
 
 namespace colony {
 
@@ -30,11 +31,9 @@ struct OverlapCounts {
 
 /// Buffers that are kept from call to call; one per thread.
 struct OverlapScratch {
-  std::vector<float> x, y, z, smooth;          // points under test
+  std::vector<float> x, y, z;                  // points under test
   std::vector<float> inside_x, inside_y, inside_z;
-  std::vector<float> band_u, band_v, band_w, band_smooth;
-  std::vector<std::uint32_t> band_index;
-  std::vector<std::uint8_t> is_inside;
+  kernel::BandBuffer band;
 };
 
 /// Counts for `body` against each of `neighbours` (any that cannot touch count 0). `wall_radius_um`: the dish, centred at the origin.

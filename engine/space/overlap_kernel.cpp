@@ -1,3 +1,4 @@
+// Preparation of bodies, and the plain C++ twin of the vector kernels (overlap_simd.cpp).
 #include "engine/space/overlap_kernel.hpp"
 
 #include "engine/base/maths.hpp"
@@ -6,8 +7,8 @@ namespace colony::kernel {
 namespace {
 
 // sin x for |x| <= 100: reduced by multiples of pi in two steps, odd Taylor polynomial to degree 11 on [-pi/2, pi/2].
-// Absolute error below 1e-6 (tests/unit/space_test.cpp). Branch-free, so that a loop over points vectorises.
-inline float sine(float x) {
+// Absolute error below 1e-6. The vector version has the same operations in the same order.
+float sine(float x) {
   const float turns = x * 0.318309886F;
   const auto k = static_cast<std::int32_t>(turns + (turns < 0.0F ? -0.5F : 0.5F));
   const auto kf = static_cast<float>(k);
@@ -18,13 +19,17 @@ inline float sine(float x) {
   sum = sum * r2 - 1.98412698e-4F;
   sum = sum * r2 + 8.33333333e-3F;
   sum = sum * r2 - 1.66666667e-1F;
-  const float s = r + r * r2 * sum;
-  return static_cast<float>(1 - 2 * (k & 1)) * s;
+  const float s = r + (r * r2) * sum;
+  return (k & 1) != 0 ? -s : s;
 }
 
 float reduced_phase(double phase) {
   const double turns = phase / (2.0 * maths::kPi);
   return static_cast<float>(phase - 2.0 * maths::kPi * static_cast<double>(static_cast<std::int64_t>(turns)));
+}
+
+void grow(std::vector<float>& buffer, std::size_t n) {
+  if (buffer.size() < n) buffer.resize(n);
 }
 
 }  // namespace
@@ -47,23 +52,26 @@ FloatBody::FloatBody(const Body& body, const Vec3& origin_um) {
   band = static_cast<float>(body.noise_bound()) * 1.0001F + 1e-5F;
 }
 
-void noise(const FloatBody& b, const float* u, const float* v, const float* w, std::size_t n, float* out) {
-  for (std::size_t i = 0; i < n; ++i) {
-    const float sx = sine(b.frequency * u[i] + b.q1[0]);
-    const float sy = sine(b.frequency * v[i] + b.q1[1]);
-    const float sz = sine(b.frequency * w[i] + b.q1[2]);
-    const float gx = b.amplitude * sx + b.second_amplitude * sine(b.slower_frequency * u[i] + b.q2[0] + b.phase * sz);
-    const float gy = b.amplitude * sy + b.second_amplitude * sine(b.slower_frequency * v[i] + b.q2[1] + b.phase * sx);
-    const float gz = b.amplitude * sz + b.second_amplitude * sine(b.slower_frequency * w[i] + b.q2[2] + b.phase * sy);
-    out[i] = gx * gy * gz;
-  }
+void BandBuffer::hold(std::size_t n) {
+  for (std::vector<float>* buffer : {&u, &v, &w, &smooth, &x, &y, &z}) grow(*buffer, n + kPadding);
 }
 
-void smooth_field(const FloatBody& b, const float* x, const float* y, const float* z, std::size_t n, float* out) {
-  for (std::size_t i = 0; i < n; ++i) {
-    const Unit p = to_unit(b, x[i], y[i], z[i]);
-    out[i] = 1.0F - p.u * p.u - p.v * p.v - p.w * p.w;
-  }
+float noise_reference(const FloatBody& b, float u, float v, float w) {
+  const float sx = sine(b.frequency * u + b.q1[0]);
+  const float sy = sine(b.frequency * v + b.q1[1]);
+  const float sz = sine(b.frequency * w + b.q1[2]);
+  const float gx = b.amplitude * sx + b.second_amplitude * sine((b.slower_frequency * u + b.q2[0]) + b.phase * sz);
+  const float gy = b.amplitude * sy + b.second_amplitude * sine((b.slower_frequency * v + b.q2[1]) + b.phase * sx);
+  const float gz = b.amplitude * sz + b.second_amplitude * sine((b.slower_frequency * w + b.q2[2]) + b.phase * sy);
+  return (gx * gy) * gz;
+}
+
+bool is_inside_reference(const FloatBody& b, float x, float y, float z) {
+  const float u = ((b.m[0] * x + b.m[1] * y) + b.m[2] * z) + b.t[0];
+  const float v = ((b.m[3] * x + b.m[4] * y) + b.m[5] * z) + b.t[1];
+  const float w = ((b.m[6] * x + b.m[7] * y) + b.m[8] * z) + b.t[2];
+  const float smooth = ((1.0F - u * u) - v * v) - w * w;
+  return smooth + noise_reference(b, u, v, w) >= 0.0F;
 }
 
 }  // namespace colony::kernel

@@ -1,14 +1,21 @@
-// overlap_kernel: the field of one body over arrays of points, single precision. The only place where speed beats form.
-// Why the same bits everywhere: only + - * and conversions, in a fixed order per point, no contraction (compiler flags), no
-// reduction over points but integer counts. Vectorised or not, a point's value is the same.
+// overlap_kernel: the sign of one body's field over arrays of points, single precision: the hot loop of the whole engine.
+// Method:  Highway, dispatched at run time over EMU128, SSSE3, SSE4, AVX2 and AVX3; the plain C++ twin does the same operations
+//          in the same order.
+// Why the same bits everywhere: only + - * and conversions, in a fixed order per point; no multiply-add, no contraction
+// (compiler flags), no reduction over points but integer counts. So a point's value does not depend on the width it was computed in.
+// Threads: pure but for the caller's buffers.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "engine/shape/body.hpp"
 
 namespace colony::kernel {
+
+/// Arrays handed to the kernels must be readable (finite values) this far beyond their n, and writable for outputs.
+inline constexpr std::size_t kPadding = 64;
 
 /// A body prepared for points given relative to `origin`.
 struct FloatBody {
@@ -20,17 +27,25 @@ struct FloatBody {
   FloatBody(const Body& body, const Vec3& origin_um);
 };
 
-/// Gardner's noise at n points (u, v, w) of the cell's frame.
-void noise(const FloatBody& body, const float* u, const float* v, const float* w, std::size_t n, float* out);
+/// The points whose sign needs the noise, gathered. Grows, never shrinks.
+struct BandBuffer {
+  std::vector<float> u, v, w, smooth, x, y, z;
+  void hold(std::size_t n);
+};
 
-/// 1 - u^2 - v^2 - w^2 at n points.
-void smooth_field(const FloatBody& body, const float* x, const float* y, const float* z, std::size_t n, float* out);
+/// How many of n points are inside.
+std::uint32_t count_inside(const FloatBody& body, const float* x, const float* y, const float* z, std::size_t n, BandBuffer& band);
 
-/// (u, v, w) of one point.
-struct Unit { float u, v, w; };
-inline Unit to_unit(const FloatBody& b, float x, float y, float z) {
-  return {b.m[0] * x + b.m[1] * y + b.m[2] * z + b.t[0], b.m[3] * x + b.m[4] * y + b.m[5] * z + b.t[1],
-          b.m[6] * x + b.m[7] * y + b.m[8] * z + b.t[2]};
-}
+/// The same, and copies the inside points to out_x, out_y, out_z (in no particular order). out may not overlap the input.
+std::uint32_t select_inside(const FloatBody& body, const float* x, const float* y, const float* z, std::size_t n, BandBuffer& band,
+                            float* out_x, float* out_y, float* out_z);
+
+/// The twin of one point in plain C++: no shortcut, the noise always evaluated.
+bool is_inside_reference(const FloatBody& body, float x, float y, float z);
+/// Gardner's noise at (u, v, w) in the cell's frame, plain C++.
+float noise_reference(const FloatBody& body, float u, float v, float w);
+
+/// The vector target in use, e.g. "AVX2".
+const char* vector_target();
 
 }  // namespace colony::kernel

@@ -1,0 +1,30 @@
+// splitting: the plane in which a cell divides, and how its nucleus comes to rest.
+// Method:  the plane holds the nucleus centre c, the nearest membrane point m and the substrate normal; its normal is the
+//          principal splitting direction. m is the nearest of kMembranePoints Sobol points of the slab |z - c_z| <= 0.3 C, z >= 0,
+//          that lie outside the deformed cell: without the slab a flat cell's nearest membrane would always be its top.
+// Units:   um.
+// Random:  the caller's point sets.        Threads: pure.
+// Source:  the paper, section 4.2 (Hertwig's long-axis rule); the substrate normal, because two points do not fix a plane, is ours.
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include "engine/model/params.hpp"
+#include "engine/random/sobol.hpp"
+#include "engine/shape/body.hpp"
+
+namespace colony {
+
+inline constexpr std::uint32_t kMembranePoints = 4096;
+inline constexpr std::uint32_t kMassPoints = 4096;
+inline constexpr std::uint32_t kIsolationPoints = 4096;
+
+/// The point nearest to `nucleus_um` (ties: the first) among the points outside f~; none if every point is inside.
+std::optional<Vec3> nearest_membrane_um(const Body& body, std::span<const Body* const> neighbours, ContactRule rule,
+                                        const Vec3& nucleus_um, const PointSet& points);
+
+/// Unit normal of the splitting plane: horizontal, across m - c. None if m lies straight above or below c.
+std::optional<Vec3> splitting_normal(const Vec3& nucleus_um, const Vec3& nearest_membrane_um);
+
+}  // namespace colony

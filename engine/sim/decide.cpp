@@ -1,0 +1,160 @@
+#include "engine/sim/decide.hpp"
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "engine/base/check.hpp"
+#include "engine/base/maths.hpp"
+#include "engine/growth/search.hpp"
+#include "engine/growth/splitting.hpp"
+#include "engine/growth/surroundings.hpp"
+#include "engine/model/cycle.hpp"
+#include "engine/space/overlap.hpp"
+
+namespace colony {
+namespace {
+
+PointSet points_for(Seed seed, const Cell& cell, Purpose purpose, std::uint32_t lane, std::uint32_t n) {
+  Stream stream(seed, cell.id, cell.ordinal, purpose, lane);
+  PointSet points;
+  scrambled_sobol(n, {stream.next_u32(), stream.next_u32(), stream.next_u32()}, points);
+  return points;
+}
+
+std::vector<const Body*> neighbours_of(const Colony& colony, CellId id) {
+  std::vector<CellId> ids;
+  colony.cells_meeting(colony.body(id).box(), ids);
+  std::vector<const Body*> bodies;
+  for (const CellId other : ids) {
+    if (other != id) bodies.push_back(&colony.body(other));
+  }
+  return bodies;
+}
+
+bool is_isolated(const Colony& colony, Seed seed, const Cell& cell) {
+  const std::vector<const Body*> neighbours = neighbours_of(colony, cell.id);
+  if (neighbours.empty()) return true;
+  const PointSet points = points_for(seed, cell, Purpose::kIsolation, 0, kIsolationPoints);
+  for (const Body* other : neighbours) {
+    if (touches(colony.body(cell.id), *other, points)) return false;
+  }
+  return true;
+}
+
+Vec3 random_direction(Seed seed, const Cell& cell) {
+  Stream stream(seed, cell.id, cell.ordinal, Purpose::kSplitDirection);
+  const auto [s, c] = maths::sincos(2.0 * maths::kPi * stream.uniform());
+  return {c, s, 0.0};
+}
+
+Vec3 splitting_direction(const Colony& colony, Seed seed, const Cell& cell) {
+  CHECK(cell.nearest_membrane_um.has_value());  // settling comes before every division: validate() sees to it
+  if (is_isolated(colony, seed, cell)) return random_direction(seed, cell);
+  return splitting_normal(cell.nucleus_um, *cell.nearest_membrane_um).value_or(random_direction(seed, cell));
+}
+
+Vec3 draw_noise_offset(const Params& params, Seed seed, const Cell& parent, std::uint32_t lane) {
+  Stream stream(seed, parent.id, parent.ordinal, Purpose::kNoiseOffset, lane);
+  const double period = noise_period(params.noise);
+  Vec3 offset;
+  for (int i = 0; i < 3; ++i) offset[i] = period * stream.uniform();
+  return offset;
+}
+
+// A cell as it is right after a division.
+Cell newborn(const BodyGeometry& body, const Cell& parent, double time_h, double cycle_h, double settle_h) {
+  Cell cell;
+  cell.generation = parent.generation + 1;
+  cell.activity = Activity::kActive;
+  cell.centre_um = body.centre_um;
+  cell.nucleus_um = centroid_above_dish_um(body);
+  cell.nucleus_radius_um = parent.nucleus_radius_um;
+  cell.semiaxes_um = body.semiaxes_um;
+  cell.rotation_rad = body.rotation_rad;
+  cell.noise_offset = body.noise_offset;
+  cell.born_h = time_h;
+  cell.due_h = time_h + cycle_h;
+  cell.settle_due_h = time_h + settle_h;
+  cell.volume_um3 = volume_above_dish_um3(body);
+  return cell;
+}
+
+Inhibited inhibited(const Colony& colony, const Params& params, Seed seed, const Cell& cell, double time_h,
+                    const SearchResult& found) {
+  Inhibited event;
+  event.fitness = found.fitness;
+  event.evaluation_count = found.evaluation_count;
+  event.corrected = found.corrected;
+  event.try_count = cell.try_count + 1;
+  // On the points of the ordinal the cell will have from this event on: those that later estimates will use.
+  event.free_share = free_share(colony, params, seed, cell, cell.ordinal + 1, {});
+  const bool unlucky = event.free_share > params.wake.free_min && event.try_count <= params.wake.tries_max;
+  if (unlucky) {
+    Stream stream(seed, cell.id, cell.ordinal, Purpose::kRetry);
+    event.due_h = time_h + draw_cycle_h(params.cycle, stream);
+  }
+  return event;
+}
+
+}  // namespace
+
+EventBody decide_division(const Colony& colony, const Params& params, Seed seed, CellId id, double time_h) {
+  const Cell& parent = colony.cell(id);
+  if (params.division.generation_limit && parent.generation >= *params.division.generation_limit) return Senesced{};
+
+  SearchTask task;
+  task.seed = seed;
+  task.cell_id = id;
+  task.ordinal = parent.ordinal;
+  task.frame.pivot_um = parent.nucleus_um;
+  task.frame.direction = splitting_direction(colony, seed, parent);
+  for (std::uint32_t lane = 0; lane < 2; ++lane) {
+    task.frame.noise_offsets[lane] = draw_noise_offset(params, seed, parent, lane);
+  }
+  const SearchResult found = find_space(colony, params, task);
+  if (params.division.inhibition && !(found.fitness >= params.contact.fitness_min)) {
+    return inhibited(colony, params, seed, parent, time_h, found);
+  }
+
+  Divided event;
+  const std::array<double, 2> cycles = draw_sibling_cycles_h(params.cycle, seed, id, parent.ordinal);
+  for (std::size_t k = 0; k < 2; ++k) {
+    event.cells[k] = newborn(found.pair.bodies[k], parent, time_h, cycles[k], params.division.settle_h);
+  }
+  event.cells[0].id = parent.id;
+  event.cells[0].parent_id = parent.parent_id;
+  event.cells[0].ordinal = parent.ordinal + 1;
+  event.cells[1].id = CellId{static_cast<std::uint32_t>(colony.cells().size() + 1)};
+  event.cells[1].parent_id = parent.id;
+  event.plane_point_um = parent.nucleus_um;
+  event.plane_normal = task.frame.direction;
+  event.direction = found.pair.direction;
+  event.fitness = found.fitness;
+  event.evaluation_count = found.evaluation_count;
+  event.corrected = found.corrected;
+  const std::array<Body, 2> bodies = {Body(found.pair.bodies[0], params.noise), Body(found.pair.bodies[1], params.noise)};
+  event.woken = wake_sleepers(colony, params, seed, time_h, {id, bodies});
+  return event;
+}
+
+EventBody decide_settling(const Colony& colony, const Params& params, Seed seed, CellId id) {
+  const Cell& cell = colony.cell(id);
+  const Body& body = colony.body(id);
+  const std::vector<const Body*> neighbours = neighbours_of(colony, id);
+  const ContactRule rule = params.contact.rule;
+  const MassEstimate mass =
+      deformed_mass(body, neighbours, rule, points_for(seed, cell, Purpose::kSettlePoints, 0, kMassPoints));
+  Settled event;
+  // A cell pressed to nothing has no centre of mass: its nucleus stays where it was.
+  event.nucleus_um = mass.hit_count > 0 ? mass.centre_um : cell.nucleus_um;
+  event.deformed_volume_um3 = mass.volume_um3;
+  event.due_h = cell.due_h;
+  // Inside everywhere in the slab cannot happen for a body within its own box; then the centre stands for m: no plane is fixed.
+  event.nearest_membrane_um = nearest_membrane_um(body, neighbours, rule, event.nucleus_um,
+                                                  points_for(seed, cell, Purpose::kSettlePoints, 1, kMembranePoints))
+                                  .value_or(event.nucleus_um);
+  return event;
+}
+
+}  // namespace colony

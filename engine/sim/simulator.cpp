@@ -1,0 +1,86 @@
+#include "engine/sim/simulator.hpp"
+
+#include <utility>
+
+#include "engine/base/check.hpp"
+#include "engine/sim/decide.hpp"
+
+namespace colony {
+namespace {
+
+std::vector<Cell> founders_of(const RunSpec& spec) {
+  CHECK(validate(spec.params).empty());
+  Result<std::vector<Cell>> cells = place_founders(spec);
+  CHECK(bool(cells));
+  return std::move(*cells);
+}
+
+}  // namespace
+
+Simulator::Simulator(RunSpec spec) : spec_(std::move(spec)), founders_(founders_of(spec_)), colony_(spec_.params) {}
+
+void Simulator::replay(const Event& stored) {
+  colony_.apply(stored);
+  agenda_.follow(stored, colony_);
+  window_.clear();
+  next_ = 0;
+}
+
+Event Simulator::commit(Event event) {
+  event.seq = colony_.last_seq() + 1;
+  canonicalise(event);
+  event.digest = digest_after(colony_.digest(), event);
+  colony_.apply(event);
+  agenda_.follow(event, colony_);
+  return event;
+}
+
+Event Simulator::finish(FinishReason reason) {
+  Event event;
+  event.time_h = colony_.time_h();
+  if (reason == FinishReason::kTime) event.time_h = *spec_.until.time_h;
+  event.body = Finished{reason, colony_.cells().size()};
+  return commit(std::move(event));
+}
+
+std::optional<FinishReason> Simulator::reason_to_finish() const {
+  if (spec_.until.cells && colony_.cells().size() >= *spec_.until.cells) return FinishReason::kCells;
+  if (agenda_.empty()) {
+    return colony_.count(Activity::kSenescent) == colony_.cells().size() ? FinishReason::kAllSenescent
+                                                                         : FinishReason::kExhausted;
+  }
+  if (spec_.until.time_h && agenda_.first().due_h > *spec_.until.time_h) return FinishReason::kTime;
+  return std::nullopt;
+}
+
+std::optional<Event> Simulator::step() {
+  if (colony_.finished()) return std::nullopt;
+  const std::size_t founded = colony_.last_seq();
+  if (founded < founders_.size()) {
+    Event event;
+    event.cell_id = founders_[founded].id;
+    event.body = Founded{founders_[founded]};
+    return commit(std::move(event));
+  }
+  if (const std::optional<FinishReason> reason = reason_to_finish()) return finish(*reason);
+
+  if (next_ == window_.size()) {
+    window_ = agenda_.due_before(agenda_.first().due_h + spec_.params.window_h);
+    next_ = 0;
+  }
+  const AgendaItem item = window_[next_++];
+  // Nothing that happens inside a window makes anything due inside it: every delay is at least as long as the window. So the
+  // window, fixed when it began, is the serial order whatever its length.
+  CHECK(item == agenda_.first());
+  Event event;
+  event.time_h = item.due_h;
+  event.cell_id = item.cell_id;
+  switch (item.kind) {
+    case DueKind::kSettle: event.body = decide_settling(colony_, spec_.params, spec_.seed, item.cell_id); break;
+    case DueKind::kDivide: event.body = decide_division(colony_, spec_.params, spec_.seed, item.cell_id, item.due_h); break;
+    case DueKind::kMove: CHECK(false && "moves are refused by validate()"); break;
+  }
+  return commit(std::move(event));
+}
+
+}  // namespace colony
