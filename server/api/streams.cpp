@@ -151,9 +151,10 @@ http::BodySource::Pull EventStream::pull(std::string& out) {
   const bool is_over = is_terminal(view->job.state);
   if (wish_.progress) append_progress(out, *view, is_over);
   if (!is_over) return Pull::kWait;
-  // With an id, so that a reader of progress alone, whose other messages have none, also comes back with Last-Event-ID.
+  // A message without data is not shown to readers, but its id counts: a reader of progress alone, whose messages have no
+  // id, then also comes back with Last-Event-ID, and gets 204.
   const Json end = {{"state", name_of(view->job.state)}, {"reason", view->job.reason}, {"last_seq", view->job.last_seq}};
-  out += "event: end\nid: " + std::to_string(view->job.last_seq) + "\ndata: " + to_text(end) + "\n\n";
+  out += "id: " + std::to_string(view->job.last_seq) + "\n\nevent: end\ndata: " + to_text(end) + "\n\n";
   return Pull::kEnd;
 }
 
