@@ -15,9 +15,9 @@ namespace {
 enum class KeyType { kText, kInteger, kTexts };
 
 struct Key {
-  std::string name;                        // "jobs.concurrent_max"
+  std::string name;  // "jobs.concurrent_max"
   KeyType type;
-  std::uint64_t min, max;                  // of kInteger
+  std::uint64_t min, max;  // of kInteger
   std::string text;
   // Takes the value in its text form (kTexts: separated by commas); answers what is wrong with it, or nothing.
   std::function<std::string(Config&, const std::string&)> set;
@@ -67,7 +67,8 @@ std::string set_listen(Config& config, const std::string& value) {
   if (host.size() > 2 && host.front() == '[' && host.back() == ']') host = host.substr(1, host.size() - 2);
   if (host == "localhost") host = "127.0.0.1";
   if (!is_loopback(host)) {
-    return "'" + host + "' is not a loopback address (127.0.0.1, [::1]): any other needs tokens and TLS, which this version "
+    return "'" + host +
+           "' is not a loopback address (127.0.0.1, [::1]): any other needs tokens and TLS, which this version "
            "does not have, so everybody who reaches the port could do everything";
   }
   config.http.address = host;
@@ -106,7 +107,8 @@ const std::vector<Key>& keys() {
   using Big = std::uint64_t;
   static const std::vector<Key> table = {
       {"server.listen", KeyType::kText, 0, 0, "loopback address and port; default 127.0.0.1:8080", set_listen},
-      {"server.data", KeyType::kText, 0, 0, "folder of all files; default $XDG_DATA_HOME/colony or ~/.local/share/colony", set_data},
+      {"server.data", KeyType::kText, 0, 0,
+       "folder of all files; default $XDG_DATA_HOME/colony or ~/.local/share/colony", set_data},
       {"server.allowed_hosts", KeyType::kTexts, 0, 0, "host names a request may be for, without port", set_hosts},
       integer_key<Size>("jobs.concurrent_max", 1, 256, "colonies growing at a time; default 1",
                         [](Config& c) -> Size& { return c.jobs.concurrent_max; }),
@@ -116,7 +118,8 @@ const std::vector<Key>& keys() {
                        [](Config& c) -> Big& { return c.jobs.cells_max; }),
       integer_key<Big>("limits.events_max", 1, 1'000'000'000'000, "events of a job; default 50000000",
                        [](Config& c) -> Big& { return c.jobs.events_max; }),
-      integer_key<Size>("limits.cached_colonies_max", 1, 10'000, "folded colonies kept for pictures and tables; default 16",
+      integer_key<Size>("limits.cached_colonies_max", 1, 10'000,
+                        "folded colonies kept for pictures and tables; default 16",
                         [](Config& c) -> Size& { return c.jobs.cached_colonies_max; }),
       integer_key<Size>("limits.header_bytes_max", 1024, 1'048'576, "header of a request; default 8192",
                         [](Config& c) -> Size& { return c.http.header_bytes_max; }),
@@ -126,7 +129,8 @@ const std::vector<Key>& keys() {
                         [](Config& c) -> Size& { return c.http.connections_max; }),
       integer_key<Size>("limits.requests_waiting_max", 1, 100'000, "requests waiting for a worker; default 256",
                         [](Config& c) -> Size& { return c.http.requests_waiting_max; }),
-      integer_key<Big>("limits.disk_free_bytes_min", 0, 1'000'000'000'000'000, "free disk below which /readyz refuses; default 10^8",
+      integer_key<Big>("limits.disk_free_bytes_min", 0, 1'000'000'000'000'000,
+                       "free disk below which /readyz refuses; default 10^8",
                        [](Config& c) -> Big& { return c.disk_free_bytes_min; }),
   };
   return table;
@@ -170,15 +174,18 @@ std::optional<std::string> text_of(const Key& key, const toml::node& node) {
   return joined;
 }
 
-void read_table(const toml::table& table, const std::string& prefix, const std::string& path, Config& config, Errors& errors) {
+void read_table(const toml::table& table, const std::string& prefix, const std::string& path, Config& config,
+                Errors& errors) {
   for (const auto& [name, node] : table) {
     const std::string full = prefix + std::string(name.str());
     const std::string where = path + ": " + full;
     if (const Key* key = find_key(full)) {
       const auto value = text_of(*key, node);
       constexpr const char* kTypes[] = {"must be a string", "must be an integer", "must be a list of strings"};
-      if (value) apply(*key, *value, where, config, errors);
-      else errors.push_back({where, kTypes[static_cast<int>(key->type)]});
+      if (value)
+        apply(*key, *value, where, config, errors);
+      else
+        errors.push_back({where, kTypes[static_cast<int>(key->type)]});
     } else if (const toml::table* inner = node.as_table(); inner != nullptr && prefix.empty()) {
       read_table(*inner, full + ".", path, config, errors);
     } else {
@@ -197,12 +204,15 @@ void read_file(const std::string& path, Config& config, Errors& errors) {
 
 void read_environment(const Environment& environment, Config& config, Errors& errors) {
   // Of the variables that begin so, only ours are known; COLONY_SERVER and COLONY_TOKEN belong to the command line.
-  constexpr const char* kPrefixes[] = {"COLONY_SERVER_", "COLONY_JOBS_", "COLONY_LIMITS_", "COLONY_AUTH_", "COLONY_TLS_"};
+  constexpr const char* kPrefixes[] = {"COLONY_SERVER_", "COLONY_JOBS_", "COLONY_LIMITS_", "COLONY_AUTH_",
+                                       "COLONY_TLS_"};
   for (const auto& [name, value] : environment) {
-    const auto key = std::find_if(keys().begin(), keys().end(), [&](const Key& one) { return variable_of(one) == name; });
+    const auto key =
+        std::find_if(keys().begin(), keys().end(), [&](const Key& one) { return variable_of(one) == name; });
     if (key != keys().end()) {
       apply(*key, value, name, config, errors);
-    } else if (std::any_of(std::begin(kPrefixes), std::end(kPrefixes), [&](const char* p) { return name.starts_with(p); })) {
+    } else if (std::any_of(std::begin(kPrefixes), std::end(kPrefixes),
+                           [&](const char* p) { return name.starts_with(p); })) {
       errors.push_back({name, "unknown key"});
     }
   }
@@ -210,7 +220,8 @@ void read_environment(const Environment& environment, Config& config, Errors& er
 
 std::string default_data_dir(const Environment& environment) {
   const auto value = [&](const char* name) {
-    const auto found = std::find_if(environment.begin(), environment.end(), [&](const auto& one) { return one.first == name; });
+    const auto found =
+        std::find_if(environment.begin(), environment.end(), [&](const auto& one) { return one.first == name; });
     return found == environment.end() ? std::string() : found->second;
   };
   // The XDG rule: a relative path there is to be ignored.
@@ -221,10 +232,11 @@ std::string default_data_dir(const Environment& environment) {
 
 }  // namespace
 
-Result<Invocation> configure(const std::vector<std::string>& arguments, const Environment& environment, std::string_view version) {
+Result<Invocation> configure(const std::vector<std::string>& arguments, const Environment& environment,
+                             std::string_view version) {
   CLI::App app("colonyd: grows cell colonies as jobs over HTTP", "colonyd");
   std::string config_path;
-  std::map<std::string, std::vector<std::string>> given;   // by key
+  std::map<std::string, std::vector<std::string>> given;  // by key
   app.add_option("--config", config_path, "TOML file with the same keys: [jobs] concurrent_max = 2");
   for (const Key& key : keys()) {
     std::string flags = flag_of(key);
@@ -258,7 +270,8 @@ Result<Invocation> configure(const std::vector<std::string>& arguments, const En
     for (const std::string& value : values) apply(key, value, flag_of(key), config, errors);
   }
   if (config.store.data_dir.empty()) config.store.data_dir = default_data_dir(environment);
-  if (config.store.data_dir.empty()) errors.push_back({"--server.data", "is needed: neither XDG_DATA_HOME nor HOME is set"});
+  if (config.store.data_dir.empty())
+    errors.push_back({"--server.data", "is needed: neither XDG_DATA_HOME nor HOME is set"});
   if (!errors.empty()) return Error{ErrorCode::kInvalid, "the configuration is wrong", std::move(errors)};
   return invocation;
 }

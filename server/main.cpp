@@ -18,7 +18,7 @@ extern char** environ;
 namespace colony::server {
 namespace {
 
-constexpr std::int64_t kGrace_ms = 5'000;   // for answers under way; with the runners' end well within the 10 s promised
+constexpr std::int64_t kGrace_ms = 5'000;  // for answers under way; with the runners' end well within the 10 s promised
 
 Environment environment() {
   Environment out;
@@ -37,8 +37,8 @@ std::string text_of(const Error& error) {
   return text;
 }
 
-// Blocked in every thread (those made later inherit it) and fetched by wait_for_signal: no code of ours runs in a signal
-// handler, and a second signal while the server ends simply stays pending.
+// Blocked in every thread (those made later inherit it) and fetched by wait_for_signal: no code of ours runs in a
+// signal handler, and a second signal while the server ends simply stays pending.
 sigset_t block_signals() {
   sigset_t set;
   sigemptyset(&set);
@@ -82,8 +82,8 @@ int serve(const Config& config) {
   });
 
   auto server = http::Server::create(config.http, router, [](const http::AccessRecord& record) {
-    spdlog::info("{} {} {} {} us {} B [{}]", record.method, record.path, record.status, record.duration_us, record.body_bytes,
-                 record.request_id);
+    spdlog::info("{} {} {} {} us {} B [{}]", record.method, record.path, record.status, record.duration_us,
+                 record.body_bytes, record.request_id);
   });
   if (!server) return fail("cannot listen", server.error());
   // Only now: a process that cannot serve must not take up jobs.

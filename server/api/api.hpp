@@ -1,5 +1,6 @@
 // api: the HTTP interface as handlers over JobService; plain Request to Response, no socket.
-// Promise: every route is in one table that also makes openapi.json; every error is a problem document; nothing is stored
+// Promise: every route is in one table that also makes openapi.json; every error is a problem document; nothing is
+// stored
 //          unless the answer says so.
 // Threads: every handler from any thread, once the routes are added.
 #pragma once
@@ -21,12 +22,12 @@
 namespace colony::server::api {
 
 struct ApiConfig {
-  std::string version;                       // of the program
+  std::string version;  // of the program
   JobsConfig jobs;
   std::size_t body_bytes_max = 1024 * 1024;
   std::size_t header_bytes_max = 8 * 1024;
   std::size_t connections_max = 2000;
-  std::uint64_t disk_free_bytes_min = 100'000'000;   // below: not ready
+  std::uint64_t disk_free_bytes_min = 100'000'000;  // below: not ready
 };
 
 inline constexpr std::size_t kJobsPerPageMax = 500;
@@ -42,7 +43,7 @@ struct Context {
   JobService& jobs;
   const ApiConfig config;
   std::atomic<bool> draining{false};
-  std::string schema_text;                   // made once
+  std::string schema_text;  // made once
   std::string openapi_text;
 };
 
@@ -50,7 +51,7 @@ struct Context {
 struct Call {
   const http::Request& request;
   Query query;
-  std::string_view media;                    // the media type to answer with
+  std::string_view media;  // the media type to answer with
   /// The job id of the path.
   const std::string& id() const { return request.path_params.at(0); }
 };
@@ -58,14 +59,14 @@ struct Call {
 /// One row per operation; handlers, query checks, content negotiation and openapi.json all follow it.
 struct Endpoint {
   std::string_view method;
-  std::string_view path;                     // "/v1/jobs/{job_id}/events"
+  std::string_view path;  // "/v1/jobs/{job_id}/events"
   std::string_view operation_id;
   std::string_view summary;
-  std::vector<std::string_view> media;       // offered, the default first; empty: no body
+  std::vector<std::string_view> media;  // offered, the default first; empty: no body
   std::vector<QueryParam> query;
-  std::vector<std::pair<int, std::string_view>> answers;   // status and description, success only
-  std::string_view schema;                   // component of the JSON answer; of one line for NDJSON
-  std::vector<ProblemKind> problems;         // beyond those that every operation can answer
+  std::vector<std::pair<int, std::string_view>> answers;  // status and description, success only
+  std::string_view schema;                                // component of the JSON answer; of one line for NDJSON
+  std::vector<ProblemKind> problems;                      // beyond those that every operation can answer
   http::Response (*handler)(Context&, const Call&);
 };
 

@@ -18,32 +18,46 @@ class ReadParam {
       : json_(json), pointer_(pointer), params_(params), errors_(errors) {}
 
   void operator()(Access<double> access) const {
-    if (json_.is_number()) access(params_) = json_.get<double>();
-    else add("must be a number");
+    if (json_.is_number())
+      access(params_) = json_.get<double>();
+    else
+      add("must be a number");
   }
   void operator()(Access<std::int64_t> access) const {
-    if (const auto value = integer_of(json_)) access(params_) = *value;
-    else add("must be an integer");
+    if (const auto value = integer_of(json_))
+      access(params_) = *value;
+    else
+      add("must be an integer");
   }
   void operator()(Access<bool> access) const {
-    if (json_.is_boolean()) access(params_) = json_.get<bool>();
-    else add("must be true or false");
+    if (json_.is_boolean())
+      access(params_) = json_.get<bool>();
+    else
+      add("must be true or false");
   }
   void operator()(Access<std::optional<double>> access) const {
-    if (json_.is_null()) access(params_).reset();
-    else if (json_.is_number()) access(params_) = json_.get<double>();
-    else add("must be a number or null");
+    if (json_.is_null())
+      access(params_).reset();
+    else if (json_.is_number())
+      access(params_) = json_.get<double>();
+    else
+      add("must be a number or null");
   }
   void operator()(Access<std::optional<std::int64_t>> access) const {
     const auto value = integer_of(json_);
-    if (json_.is_null()) access(params_).reset();
-    else if (value) access(params_) = *value;
-    else add("must be an integer or null");
+    if (json_.is_null())
+      access(params_).reset();
+    else if (value)
+      access(params_) = *value;
+    else
+      add("must be an integer or null");
   }
   void operator()(Access<Interval> access) const {
     double ends[2];
-    if (read_pair(json_, ends)) access(params_) = Interval{ends[0], ends[1]};
-    else add("must be a pair of numbers [low, high]");
+    if (read_pair(json_, ends))
+      access(params_) = Interval{ends[0], ends[1]};
+    else
+      add("must be a pair of numbers [low, high]");
   }
   void operator()(const EnumAccess& access) const {
     std::string names;
@@ -60,8 +74,10 @@ class ReadParam {
     positions.reserve(json_.size());
     for (std::size_t i = 0; i < json_.size(); ++i) {
       double ends[2];
-      if (read_pair(json_[i], ends)) positions.emplace_back(ends[0], ends[1]);
-      else errors_.push_back({child_pointer(pointer_, std::to_string(i)), "must be a pair of numbers [x, y]"});
+      if (read_pair(json_[i], ends))
+        positions.emplace_back(ends[0], ends[1]);
+      else
+        errors_.push_back({child_pointer(pointer_, std::to_string(i)), "must be a pair of numbers [x, y]"});
     }
     if (positions.size() == json_.size()) access(params_) = std::move(positions);
   }
@@ -123,8 +139,10 @@ std::vector<std::string_view> names_in(std::string_view group) {
   for (const ParamInfo& info : param_table()) {
     const std::string_view own = group_of(info.path);
     std::string_view name;
-    if (own == group) name = leaf_of(info.path);
-    else if (group.empty()) name = own;
+    if (own == group)
+      name = leaf_of(info.path);
+    else if (group.empty())
+      name = own;
     if (!name.empty() && std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
   }
   return names;
@@ -148,7 +166,8 @@ void decode_group(std::string_view group, const Json& json, const std::string& p
     const std::string at = child_pointer(pointer, name);
     if (const ParamInfo* info = find_param(group, name)) {
       std::visit(ReadParam(value, at, params, errors), info->access);
-    } else if (const auto names = names_in(""); group.empty() && std::find(names.begin(), names.end(), name) != names.end()) {
+    } else if (const auto names = names_in("");
+               group.empty() && std::find(names.begin(), names.end(), name) != names.end()) {
       decode_group(name, value, at, params, errors);
     } else {
       errors.push_back({at, unknown_field(group, name)});
@@ -176,7 +195,8 @@ void decode_model(const Json& model, const std::string& pointer, Params& params,
   }
 
   // validate() tests the rules between parameters once every single range holds. The default that stands in for a field
-  // with an error of its own must not accuse its neighbours, so one range is then broken on purpose and its error dropped.
+  // with an error of its own must not accuse its neighbours, so one range is then broken on purpose and its error
+  // dropped.
   Params checked = params;
   const bool break_one = errors.size() != before && is_range_kept(kWindow, params);
   if (break_one) checked.window_h = -1.0;
@@ -187,7 +207,7 @@ void decode_model(const Json& model, const std::string& pointer, Params& params,
 }
 
 Json encode_param(const ParamInfo& info, const Params& params) {
-  Params copy = params;   // accessors give mutable references
+  Params copy = params;  // accessors give mutable references
   return std::visit(WriteParam{copy}, info.access);
 }
 

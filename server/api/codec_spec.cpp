@@ -17,7 +17,8 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 2> kLaterPre
 
 using Errors = std::vector<FieldError>;
 
-void check_names(const Json& object, const std::string& pointer, std::span<const std::string_view> known, Errors& errors) {
+void check_names(const Json& object, const std::string& pointer, std::span<const std::string_view> known,
+                 Errors& errors) {
   for (const auto& [name, value] : object.items()) {
     if (std::find(known.begin(), known.end(), name) != known.end()) continue;
     std::string hint = suggestion(name, known);
@@ -44,7 +45,8 @@ void decode_name(const Json& json, JobSpec& spec, Errors& errors) {
 
 void decode_labels(const Json& json, JobSpec& spec, Errors& errors) {
   if (!json.is_object()) return errors.push_back({"/labels", "must be an object of strings"});
-  if (json.size() > kLabelsMax) errors.push_back({"/labels", "must have at most " + std::to_string(kLabelsMax) + " labels"});
+  if (json.size() > kLabelsMax)
+    errors.push_back({"/labels", "must have at most " + std::to_string(kLabelsMax) + " labels"});
   for (const auto& [key, value] : json.items()) {
     const std::string at = child_pointer("/labels", key);
     const std::string wrong_key = label_key_error(key);
@@ -79,8 +81,8 @@ void decode_preset(const Json& json, JobSpec& spec, Errors& errors) {
   }
   for (const auto& [later, need] : kLaterPresets) {
     if (name == later) {
-      return errors.push_back({"/preset", "needs " + std::string(need) + ", which this version does not simulate; use one of " +
-                                              names});
+      return errors.push_back(
+          {"/preset", "needs " + std::string(need) + ", which this version does not simulate; use one of " + names});
     }
   }
   errors.push_back({"/preset", "must be one of " + names + suggestion(name, preset_names())});
@@ -92,8 +94,10 @@ void decode_until(const Json* json, const SpecLimits& limits, JobSpec& spec, Err
   check_names(*json, "/until", kUntilNames, errors);
   if (const auto time = json->find("time_h"); time != json->end()) {
     const double time_h = time->is_number() ? time->get<double>() : -1.0;
-    if (time_h > 0.0 && time_h <= kUntilTimeMax_h) spec.run.until.time_h = time_h;
-    else errors.push_back({"/until/time_h", "must be a number above 0, at most 100000 h"});
+    if (time_h > 0.0 && time_h <= kUntilTimeMax_h)
+      spec.run.until.time_h = time_h;
+    else
+      errors.push_back({"/until/time_h", "must be a number above 0, at most 100000 h"});
   }
   if (const auto cells = json->find("cells"); cells != json->end()) {
     const auto count = integer_of(*cells);
@@ -148,9 +152,11 @@ Result<JobSpec> decode_spec(const Json& body, const SpecLimits& limits) {
   const std::uint64_t founder_count =
       founders.positions_um.empty() ? static_cast<std::uint64_t>(founders.count) : founders.positions_um.size();
   if (errors.size() == before_model && founder_count > limits.cells_max) {
-    errors.push_back({"/model/founders", "must be at most " + std::to_string(limits.cells_max) + ", the limit of cells in a job"});
+    errors.push_back(
+        {"/model/founders", "must be at most " + std::to_string(limits.cells_max) + ", the limit of cells in a job"});
   }
-  // Placing founders needs valid parameters and the right seed; it is the one check that can take long, so it comes last.
+  // Placing founders needs valid parameters and the right seed; it is the one check that can take long, so it comes
+  // last.
   if (errors.empty()) {
     if (const auto placed = place_founders(spec.run); !placed) {
       for (const FieldError& field : placed.error().fields) errors.push_back({"/model" + field.pointer, field.message});

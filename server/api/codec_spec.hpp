@@ -1,6 +1,8 @@
 // codec_spec: a job spec between JSON and the engine's types.
-// Promise: decode gives a complete spec or every error at once, each with its JSON Pointer; encode writes every parameter
-//          that counts, and decode(encode(spec)) is the same spec. Nothing is clamped or ignored: unknown names are errors.
+// Promise: decode gives a complete spec or every error at once, each with its JSON Pointer; encode writes every
+// parameter
+//          that counts, and decode(encode(spec)) is the same spec. Nothing is clamped or ignored: unknown names are
+//          errors.
 // Errors:  kInvalid. Founders that cannot be placed are found here too, before a job exists.
 // Threads: pure.
 #pragma once
@@ -21,13 +23,13 @@ inline constexpr std::size_t kLabelsMax = 32;
 inline constexpr std::size_t kLabelKeyBytesMax = 63;
 inline constexpr std::size_t kLabelValueBytesMax = 255;
 inline constexpr double kUntilTimeMax_h = 100'000.0;
-inline constexpr double kUntilTimeImplied_h = 10'000.0;   // where only until.cells is given
-inline constexpr Seed kSeedDefault = 1;                   // fixed, so that a spec without a seed has one history too
+inline constexpr double kUntilTimeImplied_h = 10'000.0;  // where only until.cells is given
+inline constexpr Seed kSeedDefault = 1;                  // fixed, so that a spec without a seed has one history too
 inline constexpr std::string_view kPresetDefault = "paper";
 inline constexpr std::uint64_t kCellIdMax = 4'294'967'295;
 
 struct SpecLimits {
-  std::uint64_t cells_max = kCellIdMax;   // of until.cells and of founders
+  std::uint64_t cells_max = kCellIdMax;  // of until.cells and of founders
 };
 
 struct JobSpec {

@@ -56,7 +56,9 @@ constexpr Column<Cell> kCellColumns[] = {
     {"cell_id", FieldType::kInteger, false, "identity; never reused",
      [](const Cell& c) -> Field { return static_cast<std::int64_t>(c.id.value); }},
     {"parent_id", FieldType::kInteger, true, "null for a founder",
-     [](const Cell& c) -> Field { return c.parent_id ? Field(static_cast<std::int64_t>(c.parent_id->value)) : Field(); }},
+     [](const Cell& c) -> Field {
+       return c.parent_id ? Field(static_cast<std::int64_t>(c.parent_id->value)) : Field();
+     }},
     {"generation", FieldType::kInteger, false, "divisions down its lineage",
      [](const Cell& c) -> Field { return static_cast<std::int64_t>(c.generation); }},
     {"ordinal", FieldType::kInteger, false, "events of which it was the subject",
@@ -158,17 +160,29 @@ constexpr Column<Event> kEventColumns[] = {
     {"daughter_volume_um3", FieldType::kNumber, true, "divided: volume of the new cell",
      [](const Event& e) -> Field { return of_cell(e, 1, [](const Cell& c) { return c.volume_um3; }); }},
     {"plane_x_um", FieldType::kNumber, true, "divided: point of the splitting plane",
-     [](const Event& e) -> Field { return of<Divided>(e, [](const Divided& b) { return Field(b.plane_point_um.x()); }); }},
+     [](const Event& e) -> Field {
+       return of<Divided>(e, [](const Divided& b) { return Field(b.plane_point_um.x()); });
+     }},
     {"plane_y_um", FieldType::kNumber, true, "divided: point of the splitting plane",
-     [](const Event& e) -> Field { return of<Divided>(e, [](const Divided& b) { return Field(b.plane_point_um.y()); }); }},
+     [](const Event& e) -> Field {
+       return of<Divided>(e, [](const Divided& b) { return Field(b.plane_point_um.y()); });
+     }},
     {"plane_z_um", FieldType::kNumber, true, "divided: point of the splitting plane",
-     [](const Event& e) -> Field { return of<Divided>(e, [](const Divided& b) { return Field(b.plane_point_um.z()); }); }},
+     [](const Event& e) -> Field {
+       return of<Divided>(e, [](const Divided& b) { return Field(b.plane_point_um.z()); });
+     }},
     {"normal_x", FieldType::kNumber, true, "divided: normal of the splitting plane",
-     [](const Event& e) -> Field { return of<Divided>(e, [](const Divided& b) { return Field(b.plane_normal.x()); }); }},
+     [](const Event& e) -> Field {
+       return of<Divided>(e, [](const Divided& b) { return Field(b.plane_normal.x()); });
+     }},
     {"normal_y", FieldType::kNumber, true, "divided: normal of the splitting plane",
-     [](const Event& e) -> Field { return of<Divided>(e, [](const Divided& b) { return Field(b.plane_normal.y()); }); }},
+     [](const Event& e) -> Field {
+       return of<Divided>(e, [](const Divided& b) { return Field(b.plane_normal.y()); });
+     }},
     {"normal_z", FieldType::kNumber, true, "divided: normal of the splitting plane",
-     [](const Event& e) -> Field { return of<Divided>(e, [](const Divided& b) { return Field(b.plane_normal.z()); }); }},
+     [](const Event& e) -> Field {
+       return of<Divided>(e, [](const Divided& b) { return Field(b.plane_normal.z()); });
+     }},
     {"direction_x", FieldType::kNumber, true, "divided: direction of splitting",
      [](const Event& e) -> Field { return of<Divided>(e, [](const Divided& b) { return Field(b.direction.x()); }); }},
     {"direction_y", FieldType::kNumber, true, "divided: direction of splitting",
@@ -178,13 +192,17 @@ constexpr Column<Event> kEventColumns[] = {
     {"fitness", FieldType::kNumber, true, "divided, inhibited: of the best candidate",
      [](const Event& e) -> Field { return of_search(e, [](const auto& b) { return Field(b.fitness); }); }},
     {"evaluation_count", FieldType::kInteger, true, "divided, inhibited: candidate pairs scored",
-     [](const Event& e) -> Field { return of_search(e, [](const auto& b) { return Field(static_cast<std::int64_t>(b.evaluation_count)); }); }},
+     [](const Event& e) -> Field {
+       return of_search(e, [](const auto& b) { return Field(static_cast<std::int64_t>(b.evaluation_count)); });
+     }},
     {"corrected", FieldType::kBoolean, true, "divided, inhibited: the corrector ran",
      [](const Event& e) -> Field { return of_search(e, [](const auto& b) { return Field(b.corrected); }); }},
     {"free_share", FieldType::kNumber, true, "inhibited: of the surroundings",
      [](const Event& e) -> Field { return of<Inhibited>(e, [](const Inhibited& b) { return Field(b.free_share); }); }},
     {"try_count", FieldType::kInteger, true, "inhibited: failed searches since the last change nearby",
-     [](const Event& e) -> Field { return of<Inhibited>(e, [](const Inhibited& b) { return Field(static_cast<std::int64_t>(b.try_count)); }); }},
+     [](const Event& e) -> Field {
+       return of<Inhibited>(e, [](const Inhibited& b) { return Field(static_cast<std::int64_t>(b.try_count)); });
+     }},
     {"due_h", FieldType::kNumber, true, "inhibited, settled: next division attempt",
      [](const Event& e) -> Field { return due_of(e); }},
     {"nucleus_x_um", FieldType::kNumber, true, "settled: nucleus centre",
@@ -194,19 +212,31 @@ constexpr Column<Event> kEventColumns[] = {
     {"nucleus_z_um", FieldType::kNumber, true, "settled: nucleus centre",
      [](const Event& e) -> Field { return of<Settled>(e, [](const Settled& b) { return Field(b.nucleus_um.z()); }); }},
     {"nearest_membrane_x_um", FieldType::kNumber, true, "settled: nearest membrane point",
-     [](const Event& e) -> Field { return of<Settled>(e, [](const Settled& b) { return Field(b.nearest_membrane_um.x()); }); }},
+     [](const Event& e) -> Field {
+       return of<Settled>(e, [](const Settled& b) { return Field(b.nearest_membrane_um.x()); });
+     }},
     {"nearest_membrane_y_um", FieldType::kNumber, true, "settled: nearest membrane point",
-     [](const Event& e) -> Field { return of<Settled>(e, [](const Settled& b) { return Field(b.nearest_membrane_um.y()); }); }},
+     [](const Event& e) -> Field {
+       return of<Settled>(e, [](const Settled& b) { return Field(b.nearest_membrane_um.y()); });
+     }},
     {"nearest_membrane_z_um", FieldType::kNumber, true, "settled: nearest membrane point",
-     [](const Event& e) -> Field { return of<Settled>(e, [](const Settled& b) { return Field(b.nearest_membrane_um.z()); }); }},
+     [](const Event& e) -> Field {
+       return of<Settled>(e, [](const Settled& b) { return Field(b.nearest_membrane_um.z()); });
+     }},
     {"deformed_volume_um3", FieldType::kNumber, true, "settled: estimate",
-     [](const Event& e) -> Field { return of<Settled>(e, [](const Settled& b) { return Field(b.deformed_volume_um3); }); }},
+     [](const Event& e) -> Field {
+       return of<Settled>(e, [](const Settled& b) { return Field(b.deformed_volume_um3); });
+     }},
     {"woken_count", FieldType::kInteger, true, "divided, moved: sleeping cells woken",
      [](const Event& e) -> Field { return woken_count(e); }},
     {"reason", FieldType::kString, true, "finished: why",
-     [](const Event& e) -> Field { return of<Finished>(e, [](const Finished& b) { return Field(std::string(name_of(b.reason))); }); }},
+     [](const Event& e) -> Field {
+       return of<Finished>(e, [](const Finished& b) { return Field(std::string(name_of(b.reason))); });
+     }},
     {"cell_count", FieldType::kInteger, true, "finished: cells",
-     [](const Event& e) -> Field { return of<Finished>(e, [](const Finished& b) { return Field(static_cast<std::int64_t>(b.cell_count)); }); }},
+     [](const Event& e) -> Field {
+       return of<Finished>(e, [](const Finished& b) { return Field(static_cast<std::int64_t>(b.cell_count)); });
+     }},
 };
 
 }  // namespace

@@ -30,7 +30,8 @@ struct Column {
 
 std::span<const Column<Cell>> cell_columns();
 std::span<const Column<SeriesRow>> series_columns();
-/// The CSV form of an event: its own numbers and where its subject and a daughter are; complete states are in the JSON form.
+/// The CSV form of an event: its own numbers and where its subject and a daughter are; complete states are in the JSON
+/// form.
 std::span<const Column<Event>> event_columns();
 
 /// A header line or one line of fields, RFC 4180 (CRLF); numbers in the shortest form that round-trips.

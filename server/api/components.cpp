@@ -58,9 +58,7 @@ Json event_schema(EventKind kind, const Json& own) {
 
 Json share() { return {{"type", "number"}, {"minimum", 0}, {"maximum", 1}}; }
 
-Json search_fields() {
-  return {{"fitness", share()}, {"evaluation_count", count()}, {"corrected", typed("boolean")}};
-}
+Json search_fields() { return {{"fitness", share()}, {"evaluation_count", count()}, {"corrected", typed("boolean")}}; }
 
 Json event_union() {
   Json divided = {{"cells", {{"type", "array"}, {"items", reference("Cell")}, {"minItems", 2}, {"maxItems", 2}}},
@@ -74,13 +72,14 @@ Json event_union() {
                         {"nearest_membrane_um", vec3()},
                         {"deformed_volume_um3", typed("number")},
                         {"due_h", nullable("number")}};
-  return {{"oneOf", Json::array({event_schema(EventKind::kFounded, {{"cell", reference("Cell")}}),
-                                 event_schema(EventKind::kDivided, divided), event_schema(EventKind::kInhibited, inhibited),
-                                 event_schema(EventKind::kSettled, settled),
-                                 event_schema(EventKind::kMoved, {{"cell", reference("Cell")}, {"woken", list_of("Woken")}}),
-                                 event_schema(EventKind::kSenesced, Json::object()),
-                                 event_schema(EventKind::kFinished, {{"reason", names_upto(FinishReason::kEngineChanged)},
-                                                                     {"cell_count", count()}})})}};
+  return {{"oneOf",
+           Json::array({event_schema(EventKind::kFounded, {{"cell", reference("Cell")}}),
+                        event_schema(EventKind::kDivided, divided), event_schema(EventKind::kInhibited, inhibited),
+                        event_schema(EventKind::kSettled, settled),
+                        event_schema(EventKind::kMoved, {{"cell", reference("Cell")}, {"woken", list_of("Woken")}}),
+                        event_schema(EventKind::kSenesced, Json::object()),
+                        event_schema(EventKind::kFinished, {{"reason", names_upto(FinishReason::kEngineChanged)},
+                                                            {"cell_count", count()}})})}};
 }
 
 Json spec_schema(const SpecLimits& limits) {
@@ -96,26 +95,28 @@ Json spec_schema(const SpecLimits& limits) {
 
 Json job_schema() {
   const Json path = {{"type", "string"}, {"format", "uri-reference"}};
-  return strict_object({{"id", job_id()},
-                        {"kind", typed("string")},
-                        {"name", typed("string")},
-                        {"labels", {{"type", "object"}, {"additionalProperties", typed("string")}}},
-                        {"state", names_upto(JobState::kCancelled)},
-                        {"reason", nullable("string")},
-                        {"detail", nullable("string")},
-                        {"submitted_by", typed("string")},
-                        {"created_at", wall_time(false)},
-                        {"started_at", wall_time(true)},
-                        {"finished_at", wall_time(true)},
-                        {"revision", {{"type", "integer"}, {"minimum", 1}}},
-                        {"last_seq", count()},
-                        {"digest", digest()},
-                        {"engine_version", typed("string")},
-                        {"origin", typed("null")},
-                        {"spec", reference("Spec")},
-                        {"progress", reference("Progress")},
-                        {"links", strict_object({{"self", path}, {"events", path}, {"cells", path}, {"series", path},
-                                                 {"image", path}, {"log", path}})}});
+  return strict_object(
+      {{"id", job_id()},
+       {"kind", typed("string")},
+       {"name", typed("string")},
+       {"labels", {{"type", "object"}, {"additionalProperties", typed("string")}}},
+       {"state", names_upto(JobState::kCancelled)},
+       {"reason", nullable("string")},
+       {"detail", nullable("string")},
+       {"submitted_by", typed("string")},
+       {"created_at", wall_time(false)},
+       {"started_at", wall_time(true)},
+       {"finished_at", wall_time(true)},
+       {"revision", {{"type", "integer"}, {"minimum", 1}}},
+       {"last_seq", count()},
+       {"digest", digest()},
+       {"engine_version", typed("string")},
+       {"origin", typed("null")},
+       {"spec", reference("Spec")},
+       {"progress", reference("Progress")},
+       {"links",
+        strict_object(
+            {{"self", path}, {"events", path}, {"cells", path}, {"series", path}, {"image", path}, {"log", path}})}});
 }
 
 Json progress_schema() {
@@ -130,35 +131,42 @@ Json progress_schema() {
 }
 
 Json problem_schema() {
-  const auto fault = [](const char* where) { return strict_object({{where, typed("string")}, {"message", typed("string")}}); };
+  const auto fault = [](const char* where) {
+    return strict_object({{where, typed("string")}, {"message", typed("string")}});
+  };
   Json schema = strict_object({{"type", {{"type", "string"}, {"pattern", "^urn:colony:problem:[a-z][a-z0-9-]*$"}}},
                                {"title", typed("string")},
                                {"status", {{"type", "integer"}, {"minimum", 400}, {"maximum", 599}}},
                                {"detail", typed("string")},
                                {"request_id", typed("string")}});
-  schema["properties"]["errors"] = {{"type", "array"},
-                                    {"minItems", 1},
-                                    {"items", {{"oneOf", Json::array({fault("pointer"), fault("parameter")})}}}};
+  schema["properties"]["errors"] = {
+      {"type", "array"}, {"minItems", 1}, {"items", {{"oneOf", Json::array({fault("pointer"), fault("parameter")})}}}};
   return schema;
 }
 
 Json service_info_schema() {
-  Json parameter = strict_object({{"path", typed("string")}, {"unit", typed("string")}, {"type", typed("string")}, {"text", typed("string")}});
+  Json parameter = strict_object(
+      {{"path", typed("string")}, {"unit", typed("string")}, {"type", typed("string")}, {"text", typed("string")}});
   parameter["properties"]["values"] = {{"type", "array"}, {"items", typed("string")}};
   parameter["properties"]["min"] = typed("number");
   parameter["properties"]["max"] = typed("number");
   parameter["properties"]["power_of_two"] = typed("boolean");
-  parameter["properties"]["default"] = Json::object();   // of the parameter's own type
+  parameter["properties"]["default"] = Json::object();  // of the parameter's own type
   parameter["required"].push_back("default");
-  return strict_object({{"name", typed("string")},
-                        {"version", typed("string")},
-                        {"limits", {{"type", "object"}, {"additionalProperties", typed("number")}}},
-                        {"presets", {{"type", "array"}, {"items", strict_object({{"name", typed("string")}, {"text", typed("string")},
-                                                                                 {"model", model_schema(true)}})}}},
-                        {"parameters", {{"type", "array"}, {"items", parameter}}}});
+  return strict_object(
+      {{"name", typed("string")},
+       {"version", typed("string")},
+       {"limits", {{"type", "object"}, {"additionalProperties", typed("number")}}},
+       {"presets",
+        {{"type", "array"},
+         {"items",
+          strict_object({{"name", typed("string")}, {"text", typed("string")}, {"model", model_schema(true)}})}}},
+       {"parameters", {{"type", "array"}, {"items", parameter}}}});
 }
 
-Json page_of(std::string_view component, Json next) { return strict_object({{"items", list_of(component)}, {"next", std::move(next)}}); }
+Json page_of(std::string_view component, Json next) {
+  return strict_object({{"items", list_of(component)}, {"next", std::move(next)}});
+}
 
 Json counts_schema() {
   Json properties = Json::object();
@@ -191,26 +199,32 @@ Json component_schemas(const SpecLimits& limits) {
   Json activity = names_upto(Activity::kSenescent);
   Json cell = row_schema(cell_columns());
   cell["properties"]["activity"] = std::move(activity);
-  return {{"JobSpec", std::move(job_spec)},
-          {"Spec", spec_schema(limits)},
-          {"Job", job_schema()},
-          {"Submission", submission_schema()},
-          {"JobList", page_of("Job", nullable("string"))},
-          {"JobCounts", counts_schema()},
-          {"Progress", progress_schema()},
-          {"Cell", std::move(cell)},
-          {"CellList", strict_object({{"time_h", typed("number")}, {"last_seq", count()}, {"digest", digest()},
-                                      {"items", list_of("Cell")}, {"next", typed("null")}})},
-          {"Woken", strict_object({{"cell_id", cell_id()}, {"free_share", typed("number")}, {"due_h", typed("number")}})},
-          {"Event", event_union()},
-          {"EventList", page_of("Event", {{"type", Json::array({"string", "null"})}, {"pattern", "^[0-9]+$"}})},
-          {"SeriesRow", row_schema(series_columns())},
-          {"Series", page_of("SeriesRow", typed("null"))},
-          {"LogLine", strict_object({{"index", count()}, {"at", wall_time(false)}, {"level", {{"enum", Json::array({"info", "warning", "error"})}}},
-                                     {"message", typed("string")}})},
-          {"ServiceInfo", service_info_schema()},
-          {"Health", strict_object({{"status", typed("string")}})},
-          {"Problem", problem_schema()}};
+  return {
+      {"JobSpec", std::move(job_spec)},
+      {"Spec", spec_schema(limits)},
+      {"Job", job_schema()},
+      {"Submission", submission_schema()},
+      {"JobList", page_of("Job", nullable("string"))},
+      {"JobCounts", counts_schema()},
+      {"Progress", progress_schema()},
+      {"Cell", std::move(cell)},
+      {"CellList", strict_object({{"time_h", typed("number")},
+                                  {"last_seq", count()},
+                                  {"digest", digest()},
+                                  {"items", list_of("Cell")},
+                                  {"next", typed("null")}})},
+      {"Woken", strict_object({{"cell_id", cell_id()}, {"free_share", typed("number")}, {"due_h", typed("number")}})},
+      {"Event", event_union()},
+      {"EventList", page_of("Event", {{"type", Json::array({"string", "null"})}, {"pattern", "^[0-9]+$"}})},
+      {"SeriesRow", row_schema(series_columns())},
+      {"Series", page_of("SeriesRow", typed("null"))},
+      {"LogLine", strict_object({{"index", count()},
+                                 {"at", wall_time(false)},
+                                 {"level", {{"enum", Json::array({"info", "warning", "error"})}}},
+                                 {"message", typed("string")}})},
+      {"ServiceInfo", service_info_schema()},
+      {"Health", strict_object({{"status", typed("string")}})},
+      {"Problem", problem_schema()}};
 }
 
 }  // namespace colony::server::api

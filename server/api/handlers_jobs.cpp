@@ -9,7 +9,9 @@
 namespace colony::server::api {
 namespace {
 
-http::Response failure(const Error& error, const Call& call) { return problem_response(error, call.request.request_id); }
+http::Response failure(const Error& error, const Call& call) {
+  return problem_response(error, call.request.request_id);
+}
 
 // The key of the request; empty: none.
 Result<std::string> idempotency_key(const http::Request& request) {
@@ -19,7 +21,8 @@ Result<std::string> idempotency_key(const http::Request& request) {
   const bool right = request.headers.count(kName) == 1 && !key.empty() && key.size() <= kIdempotencyKeyBytesMax &&
                      std::all_of(key.begin(), key.end(), [](char c) { return c >= ' ' && c <= '~'; });
   if (right) return key;
-  return Error{ErrorCode::kInvalid, "a header is wrong",
+  return Error{ErrorCode::kInvalid,
+               "a header is wrong",
                {{std::string(kName), "must be given once, 1 to 200 printable ASCII characters"}}};
 }
 
@@ -34,8 +37,8 @@ std::string percent_encoded(std::string_view text) {
   constexpr std::string_view kHex = "0123456789ABCDEF";
   std::string out;
   for (const char c : text) {
-    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_' ||
-                       c == '.' || c == '~';
+    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
+                       c == '_' || c == '.' || c == '~';
     if (plain) {
       out += c;
     } else {
@@ -72,7 +75,8 @@ Status check_no_arguments(const std::string& body) {
 
 http::Response command(Context& context, const Call& call,
                        Result<JobService::Commanded> (JobService::*method)(const std::string&)) {
-  if (const Status arguments = check_no_arguments(call.request.body); !arguments) return failure(arguments.error(), call);
+  if (const Status arguments = check_no_arguments(call.request.body); !arguments)
+    return failure(arguments.error(), call);
   const auto done = (context.jobs.*method)(call.id());
   if (!done) return failure(done.error(), call);
   return json_response(done->changed ? 202 : 200, encode_job(done->view));
@@ -117,13 +121,15 @@ http::Response get_jobs(Context& context, const Call& call) {
   const std::uint64_t limit = call.query.integer("limit").value_or(kJobsPerPageDefault);
   const auto cursor = call.query.text("cursor");
   if (cursor && cursor->empty()) {
-    return failure({ErrorCode::kInvalid, "query parameters are wrong", {{"cursor", "must be `next` of the page before"}}}, call);
+    return failure(
+        {ErrorCode::kInvalid, "query parameters are wrong", {{"cursor", "must be `next` of the page before"}}}, call);
   }
   const auto page = context.jobs.list(filter, limit, cursor.value_or(""));
   if (!page) return failure(page.error(), call);
   Json items = Json::array();
   for (const JobView& view : page->items) items.push_back(encode_job(view));
-  http::Response response = json_response(200, {{"items", std::move(items)}, {"next", page->next ? Json(*page->next) : Json(nullptr)}});
+  http::Response response =
+      json_response(200, {{"items", std::move(items)}, {"next", page->next ? Json(*page->next) : Json(nullptr)}});
   if (page->next) {
     std::string target = "/v1/jobs?";
     for (const auto& [name, value] : call.request.query) {

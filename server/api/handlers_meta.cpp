@@ -29,8 +29,12 @@ Json parameter_facts(const ParamInfo& info, const Params& paper) {
 
 }  // namespace
 
-http::Response get_job_schema(Context& context, const Call& call) { return text_response(call.media, context.schema_text); }
-http::Response get_openapi(Context& context, const Call& call) { return text_response(call.media, context.openapi_text); }
+http::Response get_job_schema(Context& context, const Call& call) {
+  return text_response(call.media, context.schema_text);
+}
+http::Response get_openapi(Context& context, const Call& call) {
+  return text_response(call.media, context.openapi_text);
+}
 
 http::Response get_service_info(Context& context, const Call&) {
   const ApiConfig& config = context.config;

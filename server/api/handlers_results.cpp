@@ -10,7 +10,9 @@
 namespace colony::server::api {
 namespace {
 
-http::Response failure(const Error& error, const Call& call) { return problem_response(error, call.request.request_id); }
+http::Response failure(const Error& error, const Call& call) {
+  return problem_response(error, call.request.request_id);
+}
 
 Error wrong_parameter(std::string name, std::string message) {
   return {ErrorCode::kInvalid, "query parameters are wrong", {{std::move(name), std::move(message)}}};
@@ -33,8 +35,10 @@ void read_kinds(const Query& query, StreamWish& wish) {
   if (!text) return;
   wish.progress = false;
   for (const std::string& name : split(*text, ',')) {
-    if (name == "progress") wish.progress = true;
-    else if (const auto kind = event_kind_from(name)) wish.filter.kinds.push_back(*kind);
+    if (name == "progress")
+      wish.progress = true;
+    else if (const auto kind = event_kind_from(name))
+      wish.filter.kinds.push_back(*kind);
   }
   wish.events = !wish.filter.kinds.empty();
 }
@@ -47,7 +51,9 @@ http::Response live_stream(Context& context, const Call& call, StreamWish wish) 
     const auto seq = parse_integer(*call.request.headers.get(kLastEventId));
     if (!seq || call.request.headers.count(kLastEventId) > 1 ||
         *seq > static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max())) {
-      return failure({ErrorCode::kInvalid, "a header is wrong", {{std::string(kLastEventId), "must be the seq of an event"}}}, call);
+      return failure(
+          {ErrorCode::kInvalid, "a header is wrong", {{std::string(kLastEventId), "must be the seq of an event"}}},
+          call);
     }
     is_resumed = true;
     wish.filter.after = std::max(wish.filter.after, *seq);
@@ -55,7 +61,7 @@ http::Response live_stream(Context& context, const Call& call, StreamWish wish) 
   const auto view = context.jobs.show(call.id());
   if (!view) return failure(view.error(), call);
   if (is_resumed && is_terminal(view->job.state)) {
-    bool is_left = wish.filter.after < view->job.last_seq && !wish.events;   // progress alone: its end was not seen
+    bool is_left = wish.filter.after < view->job.last_seq && !wish.events;  // progress alone: its end was not seen
     if (wish.events) {
       const auto rest = context.jobs.events(call.id(), wish.filter, 1);
       if (!rest) return failure(rest.error(), call);
@@ -67,7 +73,8 @@ http::Response live_stream(Context& context, const Call& call, StreamWish wish) 
       return response;
     }
   }
-  http::Response response = streamed("text/event-stream", std::make_unique<EventStream>(context.jobs, *view, std::move(wish)));
+  http::Response response =
+      streamed("text/event-stream", std::make_unique<EventStream>(context.jobs, *view, std::move(wish)));
   response.headers.set("Cache-Control", "no-store");
   return response;
 }
@@ -93,8 +100,8 @@ http::Response get_events(Context& context, const Call& call) {
   if (!limit && call.media == "application/json") limit = kEventsPerPageDefault;
   auto first = context.jobs.events(call.id(), wish.filter, kEventsPerRead);
   if (!first) return failure(first.error(), call);
-  return streamed(call.media, std::make_unique<EventListSource>(context.jobs, call.id(), wish.filter, limit, event_format(call.media),
-                                                                std::move(*first)));
+  return streamed(call.media, std::make_unique<EventListSource>(context.jobs, call.id(), wish.filter, limit,
+                                                                event_format(call.media), std::move(*first)));
 }
 
 http::Response get_cells(Context& context, const Call& call) {
@@ -121,7 +128,8 @@ http::Response get_series(Context& context, const Call& call) {
 
 http::Response get_image(Context& context, const Call& call) {
   if (call.query.has("um_per_px") && call.query.has("width_px")) {
-    return failure({ErrorCode::kInvalid, "query parameters are wrong",
+    return failure({ErrorCode::kInvalid,
+                    "query parameters are wrong",
                     {{"um_per_px", "not together with width_px"}, {"width_px", "not together with um_per_px"}}},
                    call);
   }

@@ -69,8 +69,8 @@ class Builder : public nlohmann::json_sax<Json> {
     std::string reason = error.what();
     if (const std::size_t bracket = reason.find("] "); bracket != std::string::npos) reason.erase(0, bracket + 2);
     if (reason.starts_with("parse error at")) reason.erase(0, reason.find(": ") + 2);
-    error_ = Error{ErrorCode::kMalformed, "malformed JSON at byte offset " + std::to_string(position == 0 ? 0 : position - 1) +
-                                              ": " + reason};
+    error_ = Error{ErrorCode::kMalformed,
+                   "malformed JSON at byte offset " + std::to_string(position == 0 ? 0 : position - 1) + ": " + reason};
     return false;
   }
 
@@ -100,8 +100,10 @@ class Builder : public nlohmann::json_sax<Json> {
     if (open_.size() >= kJsonDepthMax) return fail("nested deeper than " + std::to_string(kJsonDepthMax), false);
     const std::string token = open_.empty() ? std::string() : current_token();
     Json* placed = place(std::move(container));
-    if (!open_.empty()) pointers_.push_back(child_pointer(pointers_.back(), token));
-    else pointers_.emplace_back();
+    if (!open_.empty())
+      pointers_.push_back(child_pointer(pointers_.back(), token));
+    else
+      pointers_.emplace_back();
     open_.push_back(placed);
     return true;
   }
@@ -112,14 +114,13 @@ class Builder : public nlohmann::json_sax<Json> {
     return true;
   }
 
-  std::string current_token() const {
-    return open_.back()->is_array() ? std::to_string(open_.back()->size()) : key_;
-  }
+  std::string current_token() const { return open_.back()->is_array() ? std::to_string(open_.back()->size()) : key_; }
 
   bool fail(const std::string& reason, bool names_field) {
     error_ = Error{ErrorCode::kMalformed, "malformed JSON at byte offset " + std::to_string(read_) + ": " + reason};
     if (names_field) {
-      error_.fields.push_back({open_.empty() ? std::string() : child_pointer(pointers_.back(), current_token()), reason});
+      error_.fields.push_back(
+          {open_.empty() ? std::string() : child_pointer(pointers_.back(), current_token()), reason});
     }
     return false;
   }
@@ -127,7 +128,7 @@ class Builder : public nlohmann::json_sax<Json> {
   const std::size_t& read_;
   Json root_;
   std::vector<Json*> open_;
-  std::vector<std::string> pointers_;   // of open_
+  std::vector<std::string> pointers_;  // of open_
   std::string key_;
   Error error_{ErrorCode::kMalformed, "malformed JSON"};
 };
@@ -174,9 +175,12 @@ std::string child_pointer(std::string_view pointer, std::string_view token) {
   std::string out(pointer);
   out += '/';
   for (const char c : token) {
-    if (c == '~') out += "~0";
-    else if (c == '/') out += "~1";
-    else out += c;
+    if (c == '~')
+      out += "~0";
+    else if (c == '/')
+      out += "~1";
+    else
+      out += c;
   }
   return out;
 }

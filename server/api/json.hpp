@@ -20,7 +20,7 @@ namespace colony::server::api {
 using Json = nlohmann::ordered_json;
 
 inline constexpr std::size_t kJsonDepthMax = 32;
-inline constexpr std::size_t kJsonMembersMax = 1000;   // of one object: finding a duplicate is then bounded work
+inline constexpr std::size_t kJsonMembersMax = 1000;  // of one object: finding a duplicate is then bounded work
 
 Result<Json> parse_json(std::string_view text);
 

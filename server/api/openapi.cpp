@@ -10,12 +10,11 @@ namespace colony::server::api {
 namespace {
 
 Json problem_answer(std::string_view description) {
-  return {{"description", description}, {"content", {{"application/problem+json", {{"schema", reference("Problem")}}}}}};
+  return {{"description", description},
+          {"content", {{"application/problem+json", {{"schema", reference("Problem")}}}}}};
 }
 
-Json bound(double value) {
-  return value == std::floor(value) ? Json(static_cast<std::int64_t>(value)) : Json(value);
-}
+Json bound(double value) { return value == std::floor(value) ? Json(static_cast<std::int64_t>(value)) : Json(value); }
 
 Json query_schema(const QueryParam& param) {
   switch (param.type) {
@@ -24,17 +23,22 @@ Json query_schema(const QueryParam& param) {
       return {{"type", param.type == QueryType::kInteger ? "integer" : "number"},
               {"minimum", bound(param.min)},
               {"maximum", bound(param.max)}};
-    case QueryType::kBoolean: return {{"type", "boolean"}};
-    case QueryType::kName: return {{"type", "string"}, {"enum", param.names}};
-    case QueryType::kNames: return {{"type", "array"}, {"items", {{"type", "string"}, {"enum", param.names}}}};
-    case QueryType::kText: return {{"type", "string"}};
+    case QueryType::kBoolean:
+      return {{"type", "boolean"}};
+    case QueryType::kName:
+      return {{"type", "string"}, {"enum", param.names}};
+    case QueryType::kNames:
+      return {{"type", "array"}, {"items", {{"type", "string"}, {"enum", param.names}}}};
+    case QueryType::kText:
+      return {{"type", "string"}};
   }
   return Json::object();
 }
 
 Json parameters_of(const Endpoint& endpoint) {
   Json parameters = Json::array();
-  if (endpoint.path.find("{job_id}") != std::string_view::npos) parameters.push_back({{"$ref", "#/components/parameters/job_id"}});
+  if (endpoint.path.find("{job_id}") != std::string_view::npos)
+    parameters.push_back({{"$ref", "#/components/parameters/job_id"}});
   for (const QueryParam& param : endpoint.query) {
     Json one = {{"name", param.name}, {"in", "query"}, {"description", param.text}, {"schema", query_schema(param)}};
     if (param.type == QueryType::kNames) {
@@ -91,14 +95,20 @@ Json success_answer(const Endpoint& endpoint, int status, std::string_view descr
 
 // What the request gate and the checks before a handler can answer to any request.
 const std::map<int, std::string_view>& common_problems() {
-  static const std::map<int, std::string_view> table = {
-      {400, "the request cannot be read"},      {403, "a foreign Origin"},
-      {404, "there is no such thing"},          {405, "a method that the path does not have; see Allow"},
-      {408, "the request came too slowly"},     {413, "the body is too large"},
-      {414, "the target is too long"},          {421, "a Host that is not ours"},
-      {422, "fields or parameters are wrong"},  {431, "the header is too large"},
-      {500, "a bug in the server"},             {501, "a method or coding that is not implemented"},
-      {503, "not ready or too busy; see Retry-After"}, {505, "another HTTP version"}};
+  static const std::map<int, std::string_view> table = {{400, "the request cannot be read"},
+                                                        {403, "a foreign Origin"},
+                                                        {404, "there is no such thing"},
+                                                        {405, "a method that the path does not have; see Allow"},
+                                                        {408, "the request came too slowly"},
+                                                        {413, "the body is too large"},
+                                                        {414, "the target is too long"},
+                                                        {421, "a Host that is not ours"},
+                                                        {422, "fields or parameters are wrong"},
+                                                        {431, "the header is too large"},
+                                                        {500, "a bug in the server"},
+                                                        {501, "a method or coding that is not implemented"},
+                                                        {503, "not ready or too busy; see Retry-After"},
+                                                        {505, "another HTTP version"}};
   return table;
 }
 
@@ -134,8 +144,10 @@ Json openapi_document(std::span<const Endpoint> table, const SpecLimits& limits,
   Json paths = Json::object();
   for (const Endpoint& endpoint : table) {
     std::string method(endpoint.method);
-    std::transform(method.begin(), method.end(), method.begin(), [](char c) { return static_cast<char>(c - 'A' + 'a'); });
-    Json operation = {{"operationId", endpoint.operation_id}, {"summary", endpoint.summary}, {"parameters", parameters_of(endpoint)}};
+    std::transform(method.begin(), method.end(), method.begin(),
+                   [](char c) { return static_cast<char>(c - 'A' + 'a'); });
+    Json operation = {
+        {"operationId", endpoint.operation_id}, {"summary", endpoint.summary}, {"parameters", parameters_of(endpoint)}};
     if (endpoint.method == "POST") operation["requestBody"] = request_body_of(endpoint);
     operation["responses"] = responses_of(endpoint);
     paths[std::string(endpoint.path)][method] = std::move(operation);
@@ -145,15 +157,19 @@ Json openapi_document(std::span<const Endpoint> table, const SpecLimits& limits,
            {{"title", "Colony"},
             {"version", version},
             {"summary", "Grow cell colonies as jobs; watch, fetch and measure them"},
-            {"description", "Units are in names: _h, _um, _um2, _um3, _rad; wall times _at, RFC 3339 UTC. Errors are problem "
-                            "documents (RFC 9457) that name every wrong field at once."}}},
+            {"description",
+             "Units are in names: _h, _um, _um2, _um3, _rad; wall times _at, RFC 3339 UTC. Errors are problem "
+             "documents (RFC 9457) that name every wrong field at once."}}},
           {"jsonSchemaDialect", "https://json-schema.org/draft/2020-12/schema"},
           {"servers", Json::array({{{"url", "/"}}})},
           {"paths", std::move(paths)},
           {"components",
            {{"parameters",
              {{"job_id",
-               {{"name", "job_id"}, {"in", "path"}, {"required", true}, {"description", "id of the job, a UUIDv7 in lower case"},
+               {{"name", "job_id"},
+                {"in", "path"},
+                {"required", true},
+                {"description", "id of the job, a UUIDv7 in lower case"},
                 {"schema", {{"type", "string"}}}}}}},
             {"schemas", component_schemas(limits)}}}};
 }

@@ -37,17 +37,28 @@ const ProblemRow& problem_row(ProblemKind kind) {
 
 ProblemKind problem_kind_of(ErrorCode code) {
   switch (code) {
-    case ErrorCode::kMalformed: return ProblemKind::kMalformed;
-    case ErrorCode::kInvalid: return ProblemKind::kInvalid;
-    case ErrorCode::kNotFound: return ProblemKind::kNotFound;
-    case ErrorCode::kConflict: return ProblemKind::kJobTerminal;
-    case ErrorCode::kKeyReused: return ProblemKind::kKeyReused;
-    case ErrorCode::kNotReached: return ProblemKind::kTimeNotReached;
-    case ErrorCode::kLimit: return ProblemKind::kLimit;
-    case ErrorCode::kBusy: return ProblemKind::kBusy;
-    case ErrorCode::kStorage: return ProblemKind::kStorage;
-    case ErrorCode::kUnavailable: return ProblemKind::kUnavailable;
-    case ErrorCode::kInternal: return ProblemKind::kInternal;
+    case ErrorCode::kMalformed:
+      return ProblemKind::kMalformed;
+    case ErrorCode::kInvalid:
+      return ProblemKind::kInvalid;
+    case ErrorCode::kNotFound:
+      return ProblemKind::kNotFound;
+    case ErrorCode::kConflict:
+      return ProblemKind::kJobTerminal;
+    case ErrorCode::kKeyReused:
+      return ProblemKind::kKeyReused;
+    case ErrorCode::kNotReached:
+      return ProblemKind::kTimeNotReached;
+    case ErrorCode::kLimit:
+      return ProblemKind::kLimit;
+    case ErrorCode::kBusy:
+      return ProblemKind::kBusy;
+    case ErrorCode::kStorage:
+      return ProblemKind::kStorage;
+    case ErrorCode::kUnavailable:
+      return ProblemKind::kUnavailable;
+    case ErrorCode::kInternal:
+      return ProblemKind::kInternal;
   }
   return ProblemKind::kInternal;
 }

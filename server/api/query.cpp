@@ -27,7 +27,8 @@ std::string wrong_value(const QueryParam& param, const std::string& value) {
   switch (param.type) {
     case QueryType::kInteger: {
       const auto integer = parse_integer(value);
-      const bool inside = integer && static_cast<double>(*integer) >= param.min && static_cast<double>(*integer) <= param.max;
+      const bool inside =
+          integer && static_cast<double>(*integer) >= param.min && static_cast<double>(*integer) <= param.max;
       return inside ? "" : "must be an integer " + range;
     }
     case QueryType::kNumber: {
@@ -88,8 +89,9 @@ std::optional<std::uint64_t> parse_integer(std::string_view text) {
 std::optional<double> parse_number(std::string_view text) {
   double value = 0.0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (text.empty() || error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
-  return value + 0.0;   // -0 is 0
+  if (text.empty() || error != std::errc() || end != text.data() + text.size() || !std::isfinite(value))
+    return std::nullopt;
+  return value + 0.0;  // -0 is 0
 }
 
 std::vector<std::string> split(std::string_view text, char separator) {
@@ -108,14 +110,17 @@ Result<Query> Query::parse(const http::Request& request, std::span<const QueryPa
   std::vector<std::string_view> known;
   for (const QueryParam& param : table) known.push_back(param.name);
   for (const auto& [name, value] : request.query) {
-    const auto param = std::find_if(table.begin(), table.end(), [&](const QueryParam& one) { return one.name == name; });
+    const auto param =
+        std::find_if(table.begin(), table.end(), [&](const QueryParam& one) { return one.name == name; });
     if (param == table.end()) {
       errors.push_back({shown_name(name), "unknown parameter" + suggestion(name, known)});
       continue;
     }
     std::vector<std::string>& values = query.values_[name];
-    if (!values.empty() && !param->repeatable) errors.push_back({name, "must be given once"});
-    else if (std::string wrong = wrong_value(*param, value); !wrong.empty()) errors.push_back({name, std::move(wrong)});
+    if (!values.empty() && !param->repeatable)
+      errors.push_back({name, "must be given once"});
+    else if (std::string wrong = wrong_value(*param, value); !wrong.empty())
+      errors.push_back({name, std::move(wrong)});
     values.push_back(value);
   }
   if (!errors.empty()) return Error{ErrorCode::kInvalid, "query parameters are wrong", std::move(errors)};

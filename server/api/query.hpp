@@ -1,6 +1,6 @@
 // query: the query parameters of an endpoint, read by one table that also makes their OpenAPI description.
-// Errors:  kInvalid with every wrong parameter at once: unknown ones (with a near miss), repeated ones, values out of range.
-// Threads: pure.
+// Errors:  kInvalid with every wrong parameter at once: unknown ones (with a near miss), repeated ones, values out of
+// range. Threads: pure.
 #pragma once
 
 #include <cstdint>
@@ -16,13 +16,13 @@
 
 namespace colony::server::api {
 
-enum class QueryType { kInteger, kNumber, kBoolean, kName, kNames, kText };   // kNames: one or more, separated by commas
+enum class QueryType { kInteger, kNumber, kBoolean, kName, kNames, kText };  // kNames: one or more, separated by commas
 
 struct QueryParam {
   std::string_view name;
   QueryType type = QueryType::kText;
-  double min = 0.0, max = 0.0;                      // closed; of kInteger and kNumber
-  std::vector<std::string_view> names = {};         // of kName and kNames
+  double min = 0.0, max = 0.0;               // closed; of kInteger and kNumber
+  std::vector<std::string_view> names = {};  // of kName and kNames
   std::string_view text;
   bool repeatable = false;
 };
@@ -32,7 +32,7 @@ class Query {
   static Result<Query> parse(const http::Request& request, std::span<const QueryParam> table);
 
   bool has(std::string_view name) const { return values_.find(name) != values_.end(); }
-  std::optional<std::uint64_t> integer(std::string_view name) const;   // of a parameter with min >= 0
+  std::optional<std::uint64_t> integer(std::string_view name) const;  // of a parameter with min >= 0
   std::optional<double> number(std::string_view name) const;
   bool boolean(std::string_view name, bool otherwise) const;
   std::optional<std::string> text(std::string_view name) const;
@@ -40,7 +40,7 @@ class Query {
   std::vector<std::string> texts(std::string_view name) const;
 
  private:
-  std::map<std::string, std::vector<std::string>, std::less<>> values_;   // checked against the table
+  std::map<std::string, std::vector<std::string>, std::less<>> values_;  // checked against the table
 };
 
 /// A decimal integer without sign or spaces; nullopt for anything else and beyond 64 bits.
@@ -49,8 +49,8 @@ std::optional<std::uint64_t> parse_integer(std::string_view text);
 std::optional<double> parse_number(std::string_view text);
 std::vector<std::string> split(std::string_view text, char separator);
 
-/// Index of the offered media type that an Accept header prefers (RFC 9110, 12.5.1; ties go to the earlier one); without
-/// the header the first. nullopt: none is acceptable.
+/// Index of the offered media type that an Accept header prefers (RFC 9110, 12.5.1; ties go to the earlier one);
+/// without the header the first. nullopt: none is acceptable.
 std::optional<std::size_t> choose_media(const http::Headers& headers, std::span<const std::string_view> offered);
 /// True if the request has exactly one Content-Type, application/json, with at most the parameter charset=utf-8.
 bool has_json_body(const http::Headers& headers);

@@ -63,21 +63,20 @@ Json until_schema(const SpecLimits& limits) {
           {"additionalProperties", false}};
 }
 
-Json seed_schema() {
-  return {{"type", "integer"}, {"minimum", 0}, {"maximum", kSeedMax}, {"default", kSeedDefault}};
-}
+Json seed_schema() { return {{"type", "integer"}, {"minimum", 0}, {"maximum", kSeedMax}, {"default", kSeedDefault}}; }
 Json preset_schema() { return {{"type", "string"}, {"enum", preset_names()}, {"default", kPresetDefault}}; }
 
 Json name_schema() {
   return {{"type", "string"}, {"maxLength", kNameCharactersMax}, {"pattern", "^[^\\u0000-\\u001f\\u007f-\\u009f]*$"}};
 }
 Json labels_schema() {
-  return {{"type", "object"},
-          {"maxProperties", kLabelsMax},
-          {"propertyNames", {{"pattern", "^[a-z0-9_.-]{1,63}$"}}},
-          // A length in characters is a necessary bound only: the codec counts bytes.
-          {"additionalProperties",
-           {{"type", "string"}, {"maxLength", kLabelValueBytesMax}, {"pattern", "^[^\\u0000-\\u001f\\u007f-\\u009f]*$"}}}};
+  return {
+      {"type", "object"},
+      {"maxProperties", kLabelsMax},
+      {"propertyNames", {{"pattern", "^[a-z0-9_.-]{1,63}$"}}},
+      // A length in characters is a necessary bound only: the codec counts bytes.
+      {"additionalProperties",
+       {{"type", "string"}, {"maxLength", kLabelValueBytesMax}, {"pattern", "^[^\\u0000-\\u001f\\u007f-\\u009f]*$"}}}};
 }
 
 }  // namespace
@@ -87,7 +86,10 @@ std::string param_type_name(const ParamInfo& info) { return std::visit(TypeName{
 Json strict_object(Json properties) {
   Json required = Json::array();
   for (const auto& [name, schema] : properties.items()) required.push_back(name);
-  return {{"type", "object"}, {"properties", std::move(properties)}, {"required", required}, {"additionalProperties", false}};
+  return {{"type", "object"},
+          {"properties", std::move(properties)},
+          {"required", required},
+          {"additionalProperties", false}};
 }
 
 Json reference(std::string_view component) { return {{"$ref", "#/components/schemas/" + std::string(component)}}; }
@@ -105,7 +107,8 @@ Json model_schema(bool is_complete) {
     if (dot != std::string_view::npos) {
       const std::string group(info.path.substr(0, dot));
       if (!model["properties"].contains(group)) {
-        model["properties"][group] = {{"type", "object"}, {"properties", Json::object()}, {"additionalProperties", false}};
+        model["properties"][group] = {
+            {"type", "object"}, {"properties", Json::object()}, {"additionalProperties", false}};
         require(model, group);
       }
       parent = &model["properties"][group];
@@ -123,8 +126,9 @@ Json model_schema(bool is_complete) {
   if (is_complete) {
     founders["oneOf"] = Json::array({{{"required", by_count}}, {{"required", by_position}}});
   } else {
-    founders["not"] = {{"required", by_position},
-                       {"anyOf", Json::array({{{"required", Json::array({"count"})}}, {{"required", Json::array({"radius_um"})}}})}};
+    founders["not"] = {
+        {"required", by_position},
+        {"anyOf", Json::array({{{"required", Json::array({"count"})}}, {{"required", Json::array({"radius_um"})}}})}};
   }
   return model;
 }

@@ -53,7 +53,12 @@ ListFormat<Cell> cell_format(std::string_view media, const Json& facts) {
 
 EventListSource::EventListSource(JobService& jobs, std::string id, EventFilter filter, std::optional<std::size_t> limit,
                                  ListFormat<Event> format, std::vector<Event> first)
-    : jobs_(jobs), id_(std::move(id)), filter_(std::move(filter)), left_(limit), format_(std::move(format)), page_(std::move(first)) {}
+    : jobs_(jobs),
+      id_(std::move(id)),
+      filter_(std::move(filter)),
+      left_(limit),
+      format_(std::move(format)),
+      page_(std::move(first)) {}
 
 http::BodySource::Pull EventListSource::pull(std::string& out) {
   if (is_first_) out += format_.head;
@@ -77,7 +82,7 @@ http::BodySource::Pull EventListSource::pull(std::string& out) {
       if (!page_.empty()) next = std::to_string(filter_.after);
       break;
     }
-    if (!page_.empty()) return Pull::kMore;   // the piece is full
+    if (!page_.empty()) return Pull::kMore;  // the piece is full
     auto more = jobs_.events(id_, filter_, kEventsPerRead);
     if (!more) throw std::runtime_error("events of a list that had begun: " + more.error().message);
     page_ = std::move(*more);
@@ -130,8 +135,8 @@ void EventStream::append_progress(std::string& out, const JobView& view, bool is
 
 http::BodySource::Pull EventStream::pull(std::string& out) {
   if (std::exchange(is_first_, false)) out += "retry: 2000\n\n";
-  // The state is read before the events: a terminal state is committed with the last event, so if it is seen and no event
-  // is left after it, none will ever come.
+  // The state is read before the events: a terminal state is committed with the last event, so if it is seen and no
+  // event is left after it, none will ever come.
   const auto view = jobs_.show(id_);
   // Deleted while it was watched, or the storage failed: without `event: end` the reader reconnects and is told.
   if (!view) return Pull::kEnd;
@@ -151,9 +156,10 @@ http::BodySource::Pull EventStream::pull(std::string& out) {
   const bool is_over = is_terminal(view->job.state);
   if (wish_.progress) append_progress(out, *view, is_over);
   if (!is_over) return Pull::kWait;
-  // A message without data is not shown to readers, but its id counts: a reader of progress alone, whose messages have no
-  // id, then also comes back with Last-Event-ID, and gets 204.
-  const Json end = {{"state", name_of(view->job.state)}, {"reason", view->job.reason}, {"last_seq", view->job.last_seq}};
+  // A message without data is not shown to readers, but its id counts: a reader of progress alone, whose messages have
+  // no id, then also comes back with Last-Event-ID, and gets 204.
+  const Json end = {
+      {"state", name_of(view->job.state)}, {"reason", view->job.reason}, {"last_seq", view->job.last_seq}};
   out += "id: " + std::to_string(view->job.last_seq) + "\n\nevent: end\ndata: " + to_text(end) + "\n\n";
   return Pull::kEnd;
 }

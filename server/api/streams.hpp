@@ -27,7 +27,7 @@ inline constexpr std::chrono::milliseconds kProgressInterval{200};
 template <class Item>
 struct ListFormat {
   std::string head;
-  std::string separator;                                       // between two items
+  std::string separator;  // between two items
   std::function<void(std::string& out, const Item& item)> append;
   std::function<std::string(const std::optional<std::string>& next)> tail;
 };
@@ -40,15 +40,15 @@ ListFormat<Cell> cell_format(std::string_view media, const Json& facts);
 /// had a status of their own.
 class EventListSource : public http::BodySource {
  public:
-  EventListSource(JobService& jobs, std::string id, EventFilter filter, std::optional<std::size_t> limit, ListFormat<Event> format,
-                  std::vector<Event> first);
+  EventListSource(JobService& jobs, std::string id, EventFilter filter, std::optional<std::size_t> limit,
+                  ListFormat<Event> format, std::vector<Event> first);
   Pull pull(std::string& out) override;
 
  private:
   JobService& jobs_;
   const std::string id_;
-  EventFilter filter_;                 // after moves on with every page
-  std::optional<std::size_t> left_;    // of the limit
+  EventFilter filter_;               // after moves on with every page
+  std::optional<std::size_t> left_;  // of the limit
   const ListFormat<Event> format_;
   std::vector<Event> page_;
   bool is_first_ = true;
@@ -81,7 +81,7 @@ inline constexpr std::size_t kLogRowsPerRead = 500;
 /// What a client wants of a live stream.
 struct StreamWish {
   EventFilter filter;
-  bool events = true;                  // false: progress alone
+  bool events = true;  // false: progress alone
   bool progress = true;
 };
 
@@ -101,7 +101,7 @@ class EventStream : public http::BodySource {
   JobService& jobs_;
   const std::string id_;
   const std::int64_t job_key_;
-  StreamWish wish_;                    // filter.after moves on with every page
+  StreamWish wish_;  // filter.after moves on with every page
   const Clock clock_;
   std::unique_ptr<JobService::Subscription> subscription_;
   bool is_first_ = true;

@@ -6,7 +6,7 @@
 namespace colony::server::api {
 namespace {
 
-constexpr std::size_t kNameLengthMax = 64;   // longer ones are not near any name of ours; bounds the work
+constexpr std::size_t kNameLengthMax = 64;  // longer ones are not near any name of ours; bounds the work
 
 // Levenshtein distance.
 std::size_t distance(std::string_view a, std::string_view b) {

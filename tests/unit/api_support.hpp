@@ -50,12 +50,12 @@ class FakeJobs : public JobService {
 
   RunSpec spec;
   std::vector<Event> history;
-  std::size_t stored = SIZE_MAX;             // events visible so far
+  std::size_t stored = SIZE_MAX;  // events visible so far
   JobRow row;
   Progress progress;
   std::vector<NewJob> submitted;
-  std::map<std::string, std::string> keys;   // idempotency key to body hash
-  std::optional<Error> next_error;           // answered by the next command or submission
+  std::map<std::string, std::string> keys;  // idempotency key to body hash
+  std::optional<Error> next_error;          // answered by the next command or submission
   std::function<void()> waker;
   std::optional<std::string> asked_cursor;
   JobFilter asked_filter;
@@ -68,7 +68,8 @@ class FakeJobs : public JobService {
     if (next_error) return *std::exchange(next_error, std::nullopt);
     if (!job.idempotency_key.empty()) {
       const auto [at, is_new] = keys.emplace(job.idempotency_key, job.body_hash);
-      if (!is_new && at->second != job.body_hash) return Error{ErrorCode::kKeyReused, "the key was used with another body"};
+      if (!is_new && at->second != job.body_hash)
+        return Error{ErrorCode::kKeyReused, "the key was used with another body"};
       if (!is_new) return Submitted{view(), false};
     }
     submitted.push_back(job);
@@ -82,7 +83,8 @@ class FakeJobs : public JobService {
     asked_filter = filter;
     asked_limit = limit;
     asked_cursor = cursor;
-    if (cursor == "made-up") return Error{ErrorCode::kInvalid, "the cursor is not one of ours", {{"cursor", "made up"}}};
+    if (cursor == "made-up")
+      return Error{ErrorCode::kInvalid, "the cursor is not one of ours", {{"cursor", "made up"}}};
     return Page{{view()}, cursor.empty() ? std::optional<std::string>("a cursor&") : std::nullopt};
   }
   Result<std::vector<std::uint64_t>> counts() override { return std::vector<std::uint64_t>{1, 2, 3, 4, 5, 6}; }
@@ -99,7 +101,8 @@ class FakeJobs : public JobService {
     std::vector<Event> out;
     for (std::size_t i = 0; i < std::min(stored, history.size()) && out.size() < limit; ++i) {
       const Event& event = history[i];
-      const bool fits = filter.kinds.empty() || std::find(filter.kinds.begin(), filter.kinds.end(), event.kind()) != filter.kinds.end();
+      const bool fits = filter.kinds.empty() ||
+                        std::find(filter.kinds.begin(), filter.kinds.end(), event.kind()) != filter.kinds.end();
       if (event.seq > filter.after && fits) out.push_back(event);
     }
     return out;
@@ -173,8 +176,8 @@ class ApiFixture {
 
   api::Api& api() { return api_; }
 
-  http::Response ask(std::string method, const std::string& target, std::vector<std::pair<std::string, std::string>> headers = {},
-                     std::string body = {}) {
+  http::Response ask(std::string method, const std::string& target,
+                     std::vector<std::pair<std::string, std::string>> headers = {}, std::string body = {}) {
     http::Request request;
     request.method = std::move(method);
     const std::size_t mark = target.find('?');
@@ -193,7 +196,8 @@ class ApiFixture {
   http::Response get(const std::string& target, std::vector<std::pair<std::string, std::string>> headers = {}) {
     return ask("GET", target, std::move(headers));
   }
-  http::Response post(const std::string& target, std::string body, std::vector<std::pair<std::string, std::string>> headers = {}) {
+  http::Response post(const std::string& target, std::string body,
+                      std::vector<std::pair<std::string, std::string>> headers = {}) {
     headers.emplace_back("Content-Type", "application/json");
     return ask("POST", target, std::move(headers), std::move(body));
   }

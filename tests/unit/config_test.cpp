@@ -1,4 +1,6 @@
 // The configuration: precedence, strictness, refusals.
+#include "server/config.hpp"
+
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -6,8 +8,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-
-#include "server/config.hpp"
 
 namespace colony::server {
 namespace {
@@ -52,13 +52,15 @@ TEST(Config, HasDefaults) {
   EXPECT_EQ(config.store.data_dir, "/home/someone/.local/share/colony");
   EXPECT_EQ(config.jobs.concurrent_max, 1u);
   EXPECT_EQ(given({}, {{"HOME", "/h"}, {"XDG_DATA_HOME", "/x"}})->config.store.data_dir, "/x/colony");
-  EXPECT_EQ(given({}, {{"HOME", "/h"}, {"XDG_DATA_HOME", "relative"}})->config.store.data_dir, "/h/.local/share/colony");
+  EXPECT_EQ(given({}, {{"HOME", "/h"}, {"XDG_DATA_HOME", "relative"}})->config.store.data_dir,
+            "/h/.local/share/colony");
   EXPECT_THAT(places(given({}, {})), ElementsAre("--server.data"));
 }
 
 TEST(Config, FlagsBeatEnvironmentBeatsFile) {
-  const ConfigFile file("[jobs]\nconcurrent_max = 2\nqueued_max = 20\n[limits]\ncells_max = 200\n"
-                        "[server]\nlisten = \"[::1]:0\"\nallowed_hosts = [\"a.example\", \"b\"]\n");
+  const ConfigFile file(
+      "[jobs]\nconcurrent_max = 2\nqueued_max = 20\n[limits]\ncells_max = 200\n"
+      "[server]\nlisten = \"[::1]:0\"\nallowed_hosts = [\"a.example\", \"b\"]\n");
   Environment environment = kHome;
   environment.emplace_back("COLONY_JOBS_QUEUED_MAX", "30");
   environment.emplace_back("COLONY_LIMITS_CELLS_MAX", "300");
@@ -76,12 +78,14 @@ TEST(Config, FlagsBeatEnvironmentBeatsFile) {
 }
 
 TEST(Config, EveryFaultInTheFileIsNamed) {
-  const ConfigFile file("colour = 1\n[jobs]\nconcurrent_max = 0\nqueued_max = \"many\"\nspeed = 3\n[weather]\nrain = true\n"
-                        "[server]\nlisten = 8080\nallowed_hosts = [1]\n[limits]\ncells_max = -1\n");
+  const ConfigFile file(
+      "colour = 1\n[jobs]\nconcurrent_max = 0\nqueued_max = \"many\"\nspeed = 3\n[weather]\nrain = true\n"
+      "[server]\nlisten = 8080\nallowed_hosts = [1]\n[limits]\ncells_max = -1\n");
   const std::string at = file.path() + ": ";
   EXPECT_THAT(places(given({"--config", file.path()})),
-              ::testing::UnorderedElementsAre(at + "colour", at + "jobs.concurrent_max", at + "jobs.queued_max", at + "jobs.speed",
-                                              at + "weather.rain", at + "server.listen", at + "server.allowed_hosts", at + "limits.cells_max"));
+              ::testing::UnorderedElementsAre(at + "colour", at + "jobs.concurrent_max", at + "jobs.queued_max",
+                                              at + "jobs.speed", at + "weather.rain", at + "server.listen",
+                                              at + "server.allowed_hosts", at + "limits.cells_max"));
 }
 
 TEST(Config, AFileThatIsMissingOrBrokenIsAnError) {
@@ -92,7 +96,9 @@ TEST(Config, AFileThatIsMissingOrBrokenIsAnError) {
 }
 
 TEST(Config, UnknownOrWrongEnvironmentIsAnError) {
-  const auto with = [](const char* name, const char* value) { return places(given({}, {{"HOME", "/h"}, {name, value}})); };
+  const auto with = [](const char* name, const char* value) {
+    return places(given({}, {{"HOME", "/h"}, {name, value}}));
+  };
   EXPECT_THAT(with("COLONY_JOBS_SPEED", "1"), ElementsAre("COLONY_JOBS_SPEED"));
   EXPECT_THAT(with("COLONY_AUTH_MODE", "required"), ElementsAre("COLONY_AUTH_MODE"));
   EXPECT_THAT(with("COLONY_JOBS_CONCURRENT_MAX", "two"), ElementsAre("COLONY_JOBS_CONCURRENT_MAX"));
@@ -112,8 +118,9 @@ TEST(Config, OnlyLoopbackIsListenedOn) {
   for (const char* right : {"127.0.0.1:0", "127.1.2.3:80", "[::1]:65535", "localhost:1"}) {
     EXPECT_TRUE(given({"--listen", right})) << right;
   }
-  for (const char* wrong : {"0.0.0.0:8080", "192.168.1.1:8080", "[::]:80", "example.org:80", "127.0.0.1", "127.0.0.1:", ":80",
-                            "127.0.0.1:65536", "127.0.0.1:x", "127.0.0:80", "127.0.0.256:80", "127.0.0.1.example.org:80", ""}) {
+  for (const char* wrong :
+       {"0.0.0.0:8080", "192.168.1.1:8080", "[::]:80", "example.org:80", "127.0.0.1", "127.0.0.1:", ":80",
+        "127.0.0.1:65536", "127.0.0.1:x", "127.0.0:80", "127.0.0.256:80", "127.0.0.1.example.org:80", ""}) {
     EXPECT_THAT(places(given({"--listen", wrong})), ElementsAre("--server.listen")) << wrong;
   }
   EXPECT_THAT(given({"--listen", "0.0.0.0:80"}).error().fields.at(0).message, HasSubstr("tokens and TLS"));

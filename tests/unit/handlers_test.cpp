@@ -1,5 +1,4 @@
-// The handlers: Request to Response over a service of fixed answers; no socket, no clock of the wall.
-#include <chrono>
+// The handlers of jobs and of the server itself: Request to Response over a service of fixed answers; no socket.
 #include <set>
 #include <string>
 #include <vector>
@@ -7,19 +6,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "api_support.hpp"
-#include "server/api/codec_event.hpp"
-#include "server/api/streams.hpp"
+#include "tests/unit/api_support.hpp"
 
 namespace colony::server::testing {
 namespace {
 
 using api::Json;
-using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-using ::testing::Not;
-using ::testing::StartsWith;
 
 const std::string kJob = std::string("/v1/jobs/") + kJobId;
 const std::string kSpec = R"({"until": {"cells": 10}})";
@@ -28,19 +22,10 @@ std::string header(const http::Response& response, std::string_view name) {
   return std::string(response.headers.get(name).value_or(""));
 }
 
-std::vector<std::string> split_lines(const std::string& text, const std::string& end) {
-  std::vector<std::string> lines;
-  for (std::size_t at = 0; at < text.size();) {
-    const std::size_t stop = text.find(end, at);
-    lines.push_back(text.substr(at, stop - at));
-    at = stop == std::string::npos ? text.size() : stop + end.size();
-  }
-  return lines;
-}
-
 TEST(Submit, StoresTheCompleteSpecAndAnswers201WithLocation) {
   ApiFixture fixture;
-  auto response = fixture.post("/v1/jobs", R"({"name": "n", "labels": {"plate": "7"}, "seed": 5, "until": {"cells": 10}})");
+  auto response =
+      fixture.post("/v1/jobs", R"({"name": "n", "labels": {"plate": "7"}, "seed": 5, "until": {"cells": 10}})");
   EXPECT_EQ(response.status, 201);
   EXPECT_EQ(header(response, "Location"), kJob);
   EXPECT_EQ(json_of(response)["id"], kJobId);
@@ -56,11 +41,19 @@ TEST(Submit, StoresTheCompleteSpecAndAnswers201WithLocation) {
 }
 
 TEST(Submit, BadBodiesAreProblemsAndStoreNothing) {
-  struct Case { std::string body; int status; std::string fault; };
+  struct Case {
+    std::string body;
+    int status;
+    std::string fault;
+  };
   const std::vector<Case> cases = {
-      {"", 400, ""}, {"{", 400, ""}, {R"({"until": {"time_h": NaN}})", 400, ""},
-      {R"({"until": {"cells": 1, "cells": 2}})", 400, "/until/cells"}, {std::string(100, '['), 400, ""},
-      {"[]", 422, "-"}, {R"({"until": {"cells": 1}, "colour": 1})", 422, "/colour"},
+      {"", 400, ""},
+      {"{", 400, ""},
+      {R"({"until": {"time_h": NaN}})", 400, ""},
+      {R"({"until": {"cells": 1, "cells": 2}})", 400, "/until/cells"},
+      {std::string(100, '['), 400, ""},
+      {"[]", 422, "-"},
+      {R"({"until": {"cells": 1}, "colour": 1})", 422, "/colour"},
       {R"({"until": {"cells": 1}, "model": {"noise": {"amplitude": 0.46}}})", 422, "/model/noise/amplitude"},
       {R"({"preset": "paper"})", 422, "/until"}};
   for (const Case& one : cases) {
@@ -85,8 +78,9 @@ TEST(Submit, BadBodiesAreProblemsAndStoreNothing) {
 }
 
 TEST(Submit, EveryPostMustBeJson) {
-  for (const char* type : {"", "text/plain", "application/x-www-form-urlencoded", "multipart/form-data", "application/json; charset=latin1",
-                           "application/json; charset=utf-8; x=y", "application/jsonx", "application/json, text/plain"}) {
+  for (const char* type : {"", "text/plain", "application/x-www-form-urlencoded", "multipart/form-data",
+                           "application/json; charset=latin1", "application/json; charset=utf-8; x=y",
+                           "application/jsonx", "application/json, text/plain"}) {
     for (const std::string& path : {std::string("/v1/jobs"), kJob + "/cancel", kJob + "/pause", kJob + "/resume"}) {
       ApiFixture fixture;
       std::vector<std::pair<std::string, std::string>> headers;
@@ -116,7 +110,9 @@ TEST(Submit, DryRunAnswersSpecAndEstimateAndStoresNothing) {
 
 TEST(Submit, IdempotencyKeyGivesTheSameJobOrIsRefused) {
   ApiFixture fixture;
-  const auto with = [&](const std::string& key, const std::string& body) { return fixture.post("/v1/jobs", body, {{"Idempotency-Key", key}}); };
+  const auto with = [&](const std::string& key, const std::string& body) {
+    return fixture.post("/v1/jobs", body, {{"Idempotency-Key", key}});
+  };
   EXPECT_EQ(with("plate 7, well B2", kSpec).status, 201);
   EXPECT_EQ(with("plate 7, well B2", kSpec).status, 200);
   auto other = with("plate 7, well B2", R"({"until": {"cells": 11}})");
@@ -141,26 +137,55 @@ TEST(Submit, AFullQueueIs429WithRetryAfter) {
   EXPECT_NE(header(response, "Retry-After"), "");
 }
 
-struct QueryCase { std::string target; std::string fault; };
+struct QueryCase {
+  std::string target;
+  std::string fault;
+};
 
 TEST(Queries, EveryWrongParameterIsNamed) {
-  const std::vector<QueryCase> cases = {
-      {"/v1/jobs?colour=red", "colour"}, {"/v1/jobs?limit=0", "limit"}, {"/v1/jobs?limit=501", "limit"},
-      {"/v1/jobs?limit=ten", "limit"}, {"/v1/jobs?limit=+5", "limit"}, {"/v1/jobs?limit=5.0", "limit"}, {"/v1/jobs?limit=", "limit"},
-      {"/v1/jobs?limit=5&limit=5", "limit"}, {"/v1/jobs?state=asleep", "state"}, {"/v1/jobs?state=", "state"},
-      {"/v1/jobs?label=plate", "label"}, {"/v1/jobs?label=Pl:1", "label"}, {"/v1/jobs?cursor=", "cursor"},
-      {"/v1/jobs?cursor=made-up", "cursor"}, {"/v1/jobs?name=\xff", "name"}, {"/v1/jobs?/x=1", "%2Fx"},
-      {"/v1/jobs/counts?state=queued", "state"}, {kJob + "?wait=1", "wait"},
-      {kJob + "/events?after=-1", "after"}, {kJob + "/events?kind=exploded", "kind"}, {kJob + "/events?kind=", "kind"},
-      {kJob + "/events?kind=divided,", "kind"}, {kJob + "/events?kind=progress", "kind"}, {kJob + "/events?limit=100001", "limit"},
-      {kJob + "/events?cell_id=0", "cell_id"}, {kJob + "/events?cell_id=4294967296", "cell_id"},
-      {kJob + "/cells?at_h=NaN", "at_h"}, {kJob + "/cells?at_h=-1", "at_h"}, {kJob + "/cells?at_h=1e999", "at_h"},
-      {kJob + "/cells?at_h=inf", "at_h"}, {kJob + "/cells?at_h=0x1", "at_h"}, {kJob + "/cells?at_h= 1", "at_h"},
-      {kJob + "/series?points=0", "points"}, {kJob + "/series?points=10001", "points"},
-      {kJob + "/image?style=cubist", "style"}, {kJob + "/image?style=phase", "style"}, {kJob + "/image?width_px=15", "width_px"},
-      {kJob + "/image?width_px=1000000", "width_px"}, {kJob + "/image?um_per_px=0", "um_per_px"},
-      {kJob + "/image?um_per_px=0.000001", "um_per_px"}, {kJob + "/image?scale_bar=maybe", "scale_bar"},
-      {kJob + "/image?colour_by=mood", "colour_by"}, {"/healthz?verbose=1", "verbose"}};
+  const std::vector<QueryCase> cases = {{"/v1/jobs?colour=red", "colour"},
+                                        {"/v1/jobs?limit=0", "limit"},
+                                        {"/v1/jobs?limit=501", "limit"},
+                                        {"/v1/jobs?limit=ten", "limit"},
+                                        {"/v1/jobs?limit=+5", "limit"},
+                                        {"/v1/jobs?limit=5.0", "limit"},
+                                        {"/v1/jobs?limit=", "limit"},
+                                        {"/v1/jobs?limit=5&limit=5", "limit"},
+                                        {"/v1/jobs?state=asleep", "state"},
+                                        {"/v1/jobs?state=", "state"},
+                                        {"/v1/jobs?label=plate", "label"},
+                                        {"/v1/jobs?label=Pl:1", "label"},
+                                        {"/v1/jobs?cursor=", "cursor"},
+                                        {"/v1/jobs?cursor=made-up", "cursor"},
+                                        {"/v1/jobs?name=\xff", "name"},
+                                        {"/v1/jobs?/x=1", "%2Fx"},
+                                        {"/v1/jobs/counts?state=queued", "state"},
+                                        {kJob + "?wait=1", "wait"},
+                                        {kJob + "/events?after=-1", "after"},
+                                        {kJob + "/events?kind=exploded", "kind"},
+                                        {kJob + "/events?kind=", "kind"},
+                                        {kJob + "/events?kind=divided,", "kind"},
+                                        {kJob + "/events?kind=progress", "kind"},
+                                        {kJob + "/events?limit=100001", "limit"},
+                                        {kJob + "/events?cell_id=0", "cell_id"},
+                                        {kJob + "/events?cell_id=4294967296", "cell_id"},
+                                        {kJob + "/cells?at_h=NaN", "at_h"},
+                                        {kJob + "/cells?at_h=-1", "at_h"},
+                                        {kJob + "/cells?at_h=1e999", "at_h"},
+                                        {kJob + "/cells?at_h=inf", "at_h"},
+                                        {kJob + "/cells?at_h=0x1", "at_h"},
+                                        {kJob + "/cells?at_h= 1", "at_h"},
+                                        {kJob + "/series?points=0", "points"},
+                                        {kJob + "/series?points=10001", "points"},
+                                        {kJob + "/image?style=cubist", "style"},
+                                        {kJob + "/image?style=phase", "style"},
+                                        {kJob + "/image?width_px=15", "width_px"},
+                                        {kJob + "/image?width_px=1000000", "width_px"},
+                                        {kJob + "/image?um_per_px=0", "um_per_px"},
+                                        {kJob + "/image?um_per_px=0.000001", "um_per_px"},
+                                        {kJob + "/image?scale_bar=maybe", "scale_bar"},
+                                        {kJob + "/image?colour_by=mood", "colour_by"},
+                                        {"/healthz?verbose=1", "verbose"}};
   for (const QueryCase& one : cases) {
     ApiFixture fixture;
     auto response = fixture.get(one.target);
@@ -182,9 +207,12 @@ TEST(Queries, AllAtOnceWithNearMisses) {
 TEST(Accept, ChoosesByWeightAndListsWhatThereIs) {
   ApiFixture fixture;
   const std::vector<std::pair<std::string, std::string>> cases = {
-      {"*/*", "application/json"}, {"text/csv", "text/csv; charset=utf-8; header=present"},
-      {"application/x-ndjson;q=0.5, text/csv;q=0.4", "application/x-ndjson"}, {"text/*", "text/csv; charset=utf-8; header=present"},
-      {"application/json;q=0, */*", "application/x-ndjson"}, {"TEXT/CSV", "text/csv; charset=utf-8; header=present"}};
+      {"*/*", "application/json"},
+      {"text/csv", "text/csv; charset=utf-8; header=present"},
+      {"application/x-ndjson;q=0.5, text/csv;q=0.4", "application/x-ndjson"},
+      {"text/*", "text/csv; charset=utf-8; header=present"},
+      {"application/json;q=0, */*", "application/x-ndjson"},
+      {"TEXT/CSV", "text/csv; charset=utf-8; header=present"}};
   for (const auto& [accept, type] : cases) {
     EXPECT_EQ(header(fixture.get(kJob + "/events", {{"Accept", accept}}), "Content-Type"), type) << accept;
   }
@@ -213,7 +241,8 @@ TEST(Jobs, UnknownOnesAre404) {
 
 TEST(Jobs, WhatBelongsToLaterVersionsIsNotThere) {
   ApiFixture fixture;
-  for (const std::string& path : {kJob + "/mesh", kJob + "/analysis", std::string("/v1/sweeps"), std::string("/v1/tokens"), std::string("/docs")}) {
+  for (const std::string& path : {kJob + "/mesh", kJob + "/analysis", std::string("/v1/sweeps"),
+                                  std::string("/v1/tokens"), std::string("/docs")}) {
     EXPECT_EQ(fixture.get(path).status, 404) << path;
   }
   EXPECT_EQ(fixture.post(kJob + "/fork", "{}").status, 404);
@@ -242,11 +271,14 @@ TEST(Jobs, ListsPassFiltersAndLinkTheNextPage) {
   EXPECT_EQ(filter.state, JobState::kRunning);
   EXPECT_EQ(filter.kind, "colony");
   EXPECT_EQ(filter.name, "a b");
-  EXPECT_THAT(filter.labels, ElementsAre(std::pair<std::string, std::string>("plate", "7:x,y"), std::pair<std::string, std::string>("k", "")));
+  EXPECT_THAT(filter.labels, ElementsAre(std::pair<std::string, std::string>("plate", "7:x,y"),
+                                         std::pair<std::string, std::string>("k", "")));
   EXPECT_EQ(fixture.jobs.asked_limit, 7u);
   EXPECT_EQ(json_of(response)["next"], "a cursor&");
   EXPECT_EQ(header(response, "Link"),
-            "</v1/jobs?state=running&kind=colony&name=a%20b&label=plate%3A7%3Ax%2Cy&label=k%3A&limit=7&cursor=a%20cursor%26>; rel=\"next\"");
+            "</v1/"
+            "jobs?state=running&kind=colony&name=a%20b&label=plate%3A7%3Ax%2Cy&label=k%3A&limit=7&cursor=a%20cursor%26>"
+            "; rel=\"next\"");
   auto last = fixture.get("/v1/jobs?cursor=x");
   EXPECT_TRUE(json_of(last)["next"].is_null());
   EXPECT_EQ(header(last, "Link"), "");
@@ -276,241 +308,6 @@ TEST(Commands, AnswerByWhatChanged) {
   auto refused = fixture.ask("DELETE", kJob);
   EXPECT_EQ(refused.status, 409);
   EXPECT_EQ(json_of(refused)["type"], "urn:colony:problem:job-not-terminal");
-}
-
-TEST(Events, PagesNdjsonAndCsvAreTheSameFacts) {
-  ApiFixture fixture;
-  const std::size_t count = fixture.jobs.history.size();
-  auto whole = fixture.get(kJob + "/events");
-  const Json all = json_of(whole);
-  EXPECT_EQ(all["items"].size(), count);
-  EXPECT_TRUE(all["next"].is_null());
-
-  Json paged = Json::array();
-  std::string target = kJob + "/events?limit=4";
-  for (std::size_t pages = 0; !target.empty(); ++pages) {
-    ASSERT_LE(pages, count);
-    auto response = fixture.get(target);
-    const Json page = json_of(response);
-    EXPECT_LE(page["items"].size(), 4u);
-    for (const Json& item : page["items"]) paged.push_back(item);
-    target = page["next"].is_null() ? "" : kJob + "/events?limit=4&after=" + page["next"].get<std::string>();
-  }
-  EXPECT_EQ(paged, all["items"]);
-
-  auto ndjson = fixture.get(kJob + "/events", {{"Accept", "application/x-ndjson"}});
-  const auto lines = split_lines(body_of(ndjson), "\n");
-  ASSERT_EQ(lines.size(), count);
-  for (std::size_t i = 0; i < count; ++i) EXPECT_EQ(Json::parse(lines[i]), all["items"][i]);
-
-  auto csv = fixture.get(kJob + "/events?limit=3", {{"Accept", "text/csv"}});
-  const auto rows = split_lines(body_of(csv), "\r\n");
-  ASSERT_EQ(rows.size(), 4u);
-  EXPECT_THAT(rows[0], StartsWith("seq,time_h,kind,cell_id,digest,x_um,"));
-  EXPECT_THAT(rows[1], StartsWith("1,0,founded,1," + fixture.jobs.history[0].digest.hex() + ","));
-  for (const std::string& row : rows) {
-    EXPECT_EQ(api::split(row, ',').size(), api::event_columns().size()) << row;
-  }
-}
-
-TEST(Events, AreFiltered) {
-  ApiFixture fixture;
-  auto response = fixture.get(kJob + "/events?kind=divided,finished&after=1");
-  const Json page = json_of(response);
-  EXPECT_EQ(page["items"].size(), 6u);   // five divisions make six cells
-  for (const Json& item : page["items"]) EXPECT_TRUE(item["kind"] == "divided" || item["kind"] == "finished");
-  auto none = fixture.get(kJob + "/events?after=100000");
-  EXPECT_EQ(body_of(none), R"({"items":[],"next":null})");
-}
-
-TEST(Events, AFailureInTheMiddleIsNotAShortList) {
-  ApiFixture fixture;
-  auto response = fixture.get(kJob + "/events", {{"Accept", "application/x-ndjson"}});
-  fixture.jobs.row.id = "deleted meanwhile";
-  std::string out;
-  EXPECT_THROW(
-      while (response.stream->pull(out) != http::BodySource::Pull::kEnd) {}, std::runtime_error);
-}
-
-TEST(Cells, AreTheColonyAtATime) {
-  ApiFixture fixture;
-  auto now = fixture.get(kJob + "/cells");
-  const Json all = json_of(now);
-  EXPECT_EQ(all["items"].size(), 6u);
-  EXPECT_EQ(all["digest"], fixture.jobs.row.digest.hex());
-  EXPECT_TRUE(all["next"].is_null());
-  auto then = fixture.get(kJob + "/cells?at_h=0");
-  EXPECT_EQ(json_of(then)["items"].size(), 1u);
-  auto csv = fixture.get(kJob + "/cells", {{"Accept", "text/csv"}});
-  const auto rows = split_lines(body_of(csv), "\r\n");
-  ASSERT_EQ(rows.size(), 7u);
-  const auto names = api::split(rows[0], ',');
-  for (std::size_t row = 1; row < rows.size(); ++row) {
-    const auto fields = api::split(rows[row], ',');
-    ASSERT_EQ(fields.size(), names.size());
-    for (std::size_t i = 0; i < names.size(); ++i) {
-      const Json& value = all["items"][row - 1][names[i]];
-      if (value.is_null()) {
-        EXPECT_EQ(fields[i], "");
-      } else if (value.is_number()) {
-        EXPECT_EQ(std::stod(fields[i]), value.get<double>()) << names[i];
-      } else {
-        EXPECT_EQ(fields[i], value.get<std::string>());
-      }
-    }
-  }
-  auto early = fixture.get(kJob + "/cells?at_h=1e8");
-  EXPECT_EQ(early.status, 409);
-  EXPECT_EQ(json_of(early)["type"], "urn:colony:problem:time-not-reached");
-}
-
-TEST(Results, SeriesImageAndLog) {
-  ApiFixture fixture;
-  auto series = fixture.get(kJob + "/series?points=3");
-  EXPECT_EQ(json_of(series)["items"].size(), 3u);
-  auto csv = fixture.get(kJob + "/series", {{"Accept", "text/csv"}});
-  EXPECT_EQ(split_lines(body_of(csv), "\r\n").size(), 201u);
-  auto image = fixture.get(kJob + "/image?width_px=64&style=contours&colour_by=age&scale_bar=false");
-  EXPECT_EQ(image.status, 200);
-  EXPECT_EQ(header(image, "Content-Type"), "image/png");
-  EXPECT_THAT(image.body, StartsWith("\x89PNG\r\n\x1a\n"));
-  auto both = fixture.get(kJob + "/image?um_per_px=1&width_px=100");
-  EXPECT_EQ(both.status, 422);
-  EXPECT_THAT(faults(both), ElementsAre("um_per_px", "width_px"));
-  auto log = fixture.get(kJob + "/log");
-  EXPECT_EQ(header(log, "Content-Type"), "application/x-ndjson");
-  EXPECT_EQ(body_of(log), "{\"index\":1,\"at\":\"2026-01-02T03:04:05.678Z\",\"level\":\"info\",\"message\":\"submitted\"}\n");
-}
-
-TEST(EventStream, HasTheTextFormAndEnds) {
-  ApiFixture fixture;
-  auto response = fixture.get(kJob + "/events", {{"Accept", "text/event-stream"}});
-  EXPECT_EQ(header(response, "Content-Type"), "text/event-stream");
-  ASSERT_NE(response.stream, nullptr);
-  EXPECT_EQ(response.stream->keep_alive(), ": keep-alive\n\n");
-  EXPECT_EQ(response.stream->farewell(), "event: bye\ndata: {}\n\n");
-  const std::string text = body_of(response);
-  const auto messages = split_lines(text, "\n\n");
-  EXPECT_EQ(messages.front(), "retry: 2000");
-  const Event& first = fixture.jobs.history.front();
-  EXPECT_EQ(messages[1], "event: founded\nid: 1\ndata: " + api::to_text(api::encode_event(first)));
-  const std::string last_seq = std::to_string(fixture.jobs.row.last_seq);
-  EXPECT_EQ(messages[messages.size() - 2], "id: " + last_seq);
-  EXPECT_EQ(messages.back(), "event: end\ndata: {\"state\":\"succeeded\",\"reason\":\"cells\",\"last_seq\":" + last_seq + "}");
-  std::uint64_t seq = 0;
-  for (const std::string& message : messages) {
-    if (message.find("\nid: ") == std::string::npos) continue;
-    EXPECT_THAT(message, HasSubstr("\nid: " + std::to_string(++seq) + "\n"));
-  }
-  EXPECT_EQ(seq, fixture.jobs.row.last_seq);
-}
-
-TEST(EventStream, TheGreaterOfLastEventIdAndAfterWins) {
-  ApiFixture fixture;
-  const auto first_id = [&](const std::string& query, const std::string& id) {
-    auto response = fixture.get(kJob + "/events" + query, {{"Accept", "text/event-stream"}, {"Last-Event-ID", id}});
-    const std::string text = body_of(response);
-    const std::size_t at = text.find("id: ") + 4;
-    return text.substr(at, text.find('\n', at) - at);
-  };
-  EXPECT_EQ(first_id("", "3"), "4");
-  EXPECT_EQ(first_id("?after=5", "3"), "6");
-  EXPECT_EQ(first_id("?after=2", "3"), "4");
-  for (const char* id : {"x", "-1", "", "1.5", "99999999999999999999999"}) {
-    auto response = fixture.get(kJob + "/events", {{"Accept", "text/event-stream"}, {"Last-Event-ID", id}});
-    EXPECT_EQ(response.status, 422) << id;
-    EXPECT_THAT(faults(response), ElementsAre("Last-Event-ID"));
-  }
-  auto limited = fixture.get(kJob + "/events?limit=5", {{"Accept", "text/event-stream"}});
-  EXPECT_THAT(faults(limited), ElementsAre("limit"));
-}
-
-TEST(EventStream, AReconnectWithNothingLeftIs204) {
-  ApiFixture fixture;
-  const std::string last = std::to_string(fixture.jobs.row.last_seq);
-  const auto status = [&](const std::string& query, std::vector<std::pair<std::string, std::string>> headers) {
-    headers.emplace_back("Accept", "text/event-stream");
-    return fixture.get(kJob + "/events" + query, headers).status;
-  };
-  EXPECT_EQ(status("", {{"Last-Event-ID", last}}), 204);
-  EXPECT_EQ(status("?after=" + last, {}), 204);
-  EXPECT_EQ(status("?kind=founded", {{"Last-Event-ID", "1"}}), 204) << "nothing of its kinds is left";
-  EXPECT_EQ(status("?kind=progress", {{"Last-Event-ID", last}}), 204);
-  EXPECT_EQ(status("", {}), 200) << "a first visit gets the whole";
-  EXPECT_EQ(status("", {{"Last-Event-ID", "1"}}), 200);
-  fixture.jobs.row.state = JobState::kRunning;
-  EXPECT_EQ(status("", {{"Last-Event-ID", last}}), 200) << "a live job may go on";
-}
-
-// A stream under a clock of the test.
-class LiveStream : public ::testing::Test {
- protected:
-  void SetUp() override {
-    jobs.row.state = JobState::kRunning;
-    jobs.row.reason.clear();
-    jobs.stored = 2;
-  }
-  http::BodySource& open(const std::string& kinds = "") {
-    api::StreamWish wish;
-    if (kinds == "progress") wish.events = false;
-    stream = std::make_unique<api::EventStream>(jobs, jobs.view(), wish, [this] { return now; });
-    stream->on_ready([] {});
-    return *stream;
-  }
-  std::string pull_until(http::BodySource::Pull wanted) {
-    std::string out;
-    for (int i = 0; i < 1000; ++i) {
-      if (stream->pull(out) == wanted) return out;
-    }
-    ADD_FAILURE() << "the stream did not come to this";
-    return out;
-  }
-  FakeJobs jobs;
-  std::chrono::steady_clock::time_point now{std::chrono::hours(1)};
-  std::unique_ptr<api::EventStream> stream;
-};
-
-TEST_F(LiveStream, WaitsForWhatIsStoredNextWithoutGapOrRepetition) {
-  open();
-  EXPECT_TRUE(jobs.waker) << "it listens before it looks";
-  const std::string first = pull_until(http::BodySource::Pull::kWait);
-  EXPECT_THAT(first, HasSubstr("id: 2\n"));
-  EXPECT_THAT(first, Not(HasSubstr("id: 3\n")));
-  EXPECT_EQ(pull_until(http::BodySource::Pull::kWait), "") << "a spurious wake says nothing twice";
-  jobs.stored = 3;
-  EXPECT_THAT(pull_until(http::BodySource::Pull::kWait), StartsWith("event: " + std::string(name_of(jobs.history[2].kind())) + "\nid: 3\n"));
-  jobs.stored = jobs.history.size();
-  jobs.row.state = JobState::kCancelled;
-  jobs.row.reason = "cancelled";
-  const std::string rest = pull_until(http::BodySource::Pull::kEnd);
-  EXPECT_THAT(rest, StartsWith("event: "));
-  EXPECT_THAT(rest, HasSubstr("id: 4\n"));
-  EXPECT_THAT(rest, HasSubstr("event: end\n"));
-}
-
-TEST_F(LiveStream, ProgressComesAtMostFiveTimesASecond) {
-  open("progress");
-  int messages = 0;
-  for (int step = 0; step < 1000; ++step) {   // 10 s in steps of 10 ms, news at every one
-    ++jobs.progress.cells;
-    std::string out;
-    ASSERT_EQ(stream->pull(out), http::BodySource::Pull::kWait);
-    EXPECT_THAT(out, Not(HasSubstr("id: ")));
-    messages += out.find("event: progress\n") != std::string::npos;
-    now += std::chrono::milliseconds(10);
-  }
-  EXPECT_EQ(messages, 50);
-  now += std::chrono::seconds(1);
-  pull_until(http::BodySource::Pull::kWait);
-  now += std::chrono::seconds(1);
-  EXPECT_EQ(pull_until(http::BodySource::Pull::kWait), "") << "no news, no message";
-}
-
-TEST_F(LiveStream, AJobDeletedUnderItEndsItWithoutEnd) {
-  open();
-  pull_until(http::BodySource::Pull::kWait);
-  jobs.row.id = "deleted meanwhile";
-  EXPECT_EQ(pull_until(http::BodySource::Pull::kEnd), "");
 }
 
 TEST(Meta, ServiceInfoSchemaAndOpenapi) {
@@ -570,7 +367,7 @@ TEST(Meta, HealthAndReadiness) {
   EXPECT_EQ(fixture.get("/healthz").status, 200);
 
   api::ApiConfig config = ApiFixture::config();
-  config.disk_free_bytes_min = std::uint64_t{1} << 62;   // no disk has this much
+  config.disk_free_bytes_min = std::uint64_t{1} << 62;  // no disk has this much
   ApiFixture full(config);
   EXPECT_EQ(full.get("/readyz").status, 503);
 }
