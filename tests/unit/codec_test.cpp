@@ -169,10 +169,11 @@ TEST(Spec, LabelAndNameLimits) {
 TEST(Spec, RoundTripsWithEveryParameter) {
   const std::vector<std::string> texts = {
       R"({"until": {"cells": 10}})",
-      R"({"seed": 9007199254740991, "preset": "clonogenic", "until": {"time_h": 0.1}, "model": {"founders": {"count": 3}}})",
+      R"({"seed": 9007199254740991, "preset": "clonogenic", "until": {"time_h": 0.1},
+          "model": {"founders": {"count": 3}}})",
       with_model(
-          R"({"founders": {"positions_um": [[0.1, -3e2], [123.456789012345678, 7]]}, "division": {"generation_limit": null},
-                     "search": {"mutation_rate": 0.123456789012345678}, "cycle": {"mean_h": 12.000000000000002}})"),
+          R"({"founders": {"positions_um": [[0.1, -3e2], [123.456789012345678, 7]]},
+              "division": {"generation_limit": null}, "search": {"mutation_rate": 0.123456789012345678}, "cycle": {"mean_h": 12.000000000000002}})"),
   };
   for (const std::string& text : texts) {
     const auto first = decode(text);
