@@ -72,7 +72,12 @@ http::Response problem_response(ProblemKind kind, const Error& error, std::strin
                {"request_id", request_id}};
   if (!error.fields.empty()) {
     Json& fields = body["errors"] = Json::array();
+    if (error.fields.size() > kProblemErrorsMax) {
+      body["detail"] = error.message + " (the first " + std::to_string(kProblemErrorsMax) + " of " +
+                       std::to_string(error.fields.size()) + " errors are listed)";
+    }
     for (const FieldError& field : error.fields) {
+      if (fields.size() >= kProblemErrorsMax) break;
       const bool is_pointer = field.pointer.empty() || field.pointer.front() == '/';
       fields.push_back({{is_pointer ? "pointer" : "parameter", field.pointer}, {"message", field.message}});
     }

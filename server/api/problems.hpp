@@ -3,6 +3,7 @@
 // errors. Threads: pure.
 #pragma once
 
+#include <cstddef>
 #include <span>
 #include <string>
 #include <string_view>
@@ -28,6 +29,10 @@ enum class ProblemKind {
   kUnsupportedMediaType,
   kNotAcceptable
 };
+
+/// Of one document; a list of 100,000 wrong positions needs no 100,000 lines of answer. The detail says how many there
+/// are.
+inline constexpr std::size_t kProblemErrorsMax = 1000;
 
 struct ProblemRow {
   ProblemKind kind;

@@ -106,8 +106,7 @@ TEST(Spec, OneFaultIsNamedByItsPointer) {
       {with_model(R"({"founders": {"positions_um": []}})"), "/model/founders/positions_um"},
       {with_model(R"({"founders": {"positions_um": [[0]]}})"), "/model/founders/positions_um/0"},
       {with_model(R"({"founders": {"positions_um": [[0, 0]], "count": 1}})"), "/model/founders"},
-      {with_model(R"({"founders": {"positions_um": [[0, 0], [500, 0], [0.5, 0]]}})"),
-       "/model/founders/positions_um/2"},
+      {with_model(R"({"founders": {"positions_um": [[0, 0], [500, 0], [0.5, 0]]}})"), "/model/founders/positions_um/2"},
       {with_model(R"({"founders": {"positions_um": [[0, 0], [500, 0]]}, "dish": {"radius_um": 200}})"),
        "/model/founders/positions_um/1"},
   };
@@ -173,7 +172,8 @@ TEST(Spec, RoundTripsWithEveryParameter) {
           "model": {"founders": {"count": 3}}})",
       with_model(
           R"({"founders": {"positions_um": [[0.1, -3e2], [123.456789012345678, 7]]},
-              "division": {"generation_limit": null}, "search": {"mutation_rate": 0.123456789012345678}, "cycle": {"mean_h": 12.000000000000002}})"),
+              "division": {"generation_limit": null}, 
+              "search": {"mutation_rate": 0.123456789012345678}, "cycle": {"mean_h": 12.000000000000002}})"),
   };
   for (const std::string& text : texts) {
     const auto first = decode(text);

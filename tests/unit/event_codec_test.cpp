@@ -126,10 +126,9 @@ TEST(EventJson, InhibitedCarriesItsSearch) {
   event.time_h = 1.5;
   event.cell_id = CellId{4};
   event.body = Inhibited{0.7, 0.1, 2, 416, true, std::nullopt};
-  EXPECT_EQ(
-      to_text(encode_event(event)),
-      R"({"seq":9,"time_h":1.5,"kind":"inhibited","cell_id":4,"digest":"00000000000000000000000000000000",)"
-      R"("fitness":0.7,"free_share":0.1,"try_count":2,"evaluation_count":416,"corrected":true,"due_h":null})");
+  EXPECT_EQ(to_text(encode_event(event)),
+            R"({"seq":9,"time_h":1.5,"kind":"inhibited","cell_id":4,"digest":"00000000000000000000000000000000",)"
+            R"("fitness":0.7,"free_share":0.1,"try_count":2,"evaluation_count":416,"corrected":true,"due_h":null})");
 }
 
 TEST(Csv, FollowsRfc4180AndRoundTrips) {

@@ -77,6 +77,17 @@ TEST(Submit, BadBodiesAreProblemsAndStoreNothing) {
   }
 }
 
+TEST(Submit, AThousandErrorsAreListedAndAllCounted) {
+  ApiFixture fixture;
+  std::string positions;
+  for (int i = 0; i < 1500; ++i) positions += (i ? "," : "") + std::string("[0]");
+  auto response = fixture.post(
+      "/v1/jobs", R"({"until": {"cells": 1}, "model": {"founders": {"positions_um": [)" + positions + "]}}}");
+  EXPECT_EQ(response.status, 422);
+  EXPECT_EQ(faults(response).size(), 1000u);
+  EXPECT_THAT(json_of(response)["detail"].get<std::string>(), HasSubstr("the first 1000 of 1500"));
+}
+
 TEST(Submit, EveryPostMustBeJson) {
   for (const char* type : {"", "text/plain", "application/x-www-form-urlencoded", "multipart/form-data",
                            "application/json; charset=latin1", "application/json; charset=utf-8; x=y",
