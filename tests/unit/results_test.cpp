@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/api/columns.hpp"
 #include "tests/unit/api_support.hpp"
 
 namespace colony::server::testing {
