@@ -1,0 +1,112 @@
+// api: the HTTP interface as handlers over JobService; plain Request to Response, no socket.
+// Promise: every route is in one table that also makes openapi.json; every error is a problem document; nothing is
+// stored
+//          unless the answer says so.
+// Threads: every handler from any thread, once the routes are added.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/api/codec_spec.hpp"
+#include "server/api/problems.hpp"
+#include "server/api/query.hpp"
+#include "server/http/router.hpp"
+#include "server/jobs/service.hpp"
+
+namespace colony::server::api {
+
+struct ApiConfig {
+  std::string version;  // of the program
+  JobsConfig jobs;
+  std::size_t body_bytes_max = 1024 * 1024;
+  std::size_t header_bytes_max = 8 * 1024;
+  std::size_t connections_max = 2000;
+  std::uint64_t disk_free_bytes_min = 100'000'000;  // below: not ready
+};
+
+inline constexpr std::size_t kJobsPerPageMax = 500;
+inline constexpr std::size_t kJobsPerPageDefault = 50;
+inline constexpr std::size_t kEventsPerPageMax = 100'000;
+inline constexpr std::size_t kEventsPerPageDefault = 1000;
+inline constexpr std::size_t kSeriesPointsMax = 10'000;
+inline constexpr std::size_t kSeriesPointsDefault = 200;
+inline constexpr std::size_t kIdempotencyKeyBytesMax = 200;
+
+/// What handlers work with.
+struct Context {
+  JobService& jobs;
+  const ApiConfig config;
+  std::atomic<bool> draining{false};
+  std::string schema_text;  // made once
+  std::string openapi_text;
+};
+
+/// A request that has passed the table's checks.
+struct Call {
+  const http::Request& request;
+  Query query;
+  std::string_view media;  // the media type to answer with
+  /// The job id of the path.
+  const std::string& id() const { return request.path_params.at(0); }
+};
+
+/// One row per operation; handlers, query checks, content negotiation and openapi.json all follow it.
+struct Endpoint {
+  std::string_view method;
+  std::string_view path;  // "/v1/jobs/{job_id}/events"
+  std::string_view operation_id;
+  std::string_view summary;
+  std::vector<std::string_view> media;  // offered, the default first; empty: no body
+  std::vector<QueryParam> query;
+  std::vector<std::pair<int, std::string_view>> answers;  // status and description, success only
+  std::string_view schema;                                // component of the JSON answer; of one line for NDJSON
+  std::vector<ProblemKind> problems;                      // beyond those that every operation can answer
+  http::Response (*handler)(Context&, const Call&);
+};
+
+std::span<const Endpoint> endpoints();
+
+class Api {
+ public:
+  Api(JobService& jobs, ApiConfig config);
+  /// The router keeps references to this object.
+  void add_routes(http::Router& router);
+  /// From now on /readyz answers 503.
+  void drain() { context_->draining = true; }
+
+ private:
+  std::unique_ptr<Context> context_;
+};
+
+/// Runs one endpoint: query, Accept and Content-Type first, then its handler.
+http::Response run_endpoint(const Endpoint& endpoint, Context& context, const http::Request& request);
+
+http::Response json_response(int status, const Json& body);
+
+// One function per endpoint.
+http::Response post_job(Context& context, const Call& call);
+http::Response get_jobs(Context& context, const Call& call);
+http::Response get_job_counts(Context& context, const Call& call);
+http::Response get_job(Context& context, const Call& call);
+http::Response cancel_job(Context& context, const Call& call);
+http::Response pause_job(Context& context, const Call& call);
+http::Response resume_job(Context& context, const Call& call);
+http::Response delete_job(Context& context, const Call& call);
+http::Response get_events(Context& context, const Call& call);
+http::Response get_cells(Context& context, const Call& call);
+http::Response get_series(Context& context, const Call& call);
+http::Response get_image(Context& context, const Call& call);
+http::Response get_log(Context& context, const Call& call);
+http::Response get_job_schema(Context& context, const Call& call);
+http::Response get_openapi(Context& context, const Call& call);
+http::Response get_service_info(Context& context, const Call& call);
+http::Response get_healthz(Context& context, const Call& call);
+http::Response get_readyz(Context& context, const Call& call);
+
+}  // namespace colony::server::api

@@ -1,0 +1,131 @@
+#include "server/api/codec_event.hpp"
+
+namespace colony::server::api {
+namespace {
+
+Json vec3(const Vec3& v) { return Json::array({v.x(), v.y(), v.z()}); }
+
+template <class T>
+Json maybe(const std::optional<T>& value) {
+  return value ? Json(*value) : Json(nullptr);
+}
+Json text_or_null(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
+
+Json woken_list(const std::vector<Woken>& woken) {
+  Json list = Json::array();
+  for (const Woken& one : woken) {
+    list.push_back({{"cell_id", one.cell_id.value}, {"free_share", one.free_share}, {"due_h", one.due_h}});
+  }
+  return list;
+}
+
+struct AddBody {
+  Json& out;
+  void operator()(const Founded& body) const { out["cell"] = encode_cell(body.cell); }
+  void operator()(const Divided& body) const {
+    out["cells"] = Json::array({encode_cell(body.cells[0]), encode_cell(body.cells[1])});
+    out["plane"] = {{"point_um", vec3(body.plane_point_um)}, {"normal", vec3(body.plane_normal)}};
+    out["direction"] = vec3(body.direction);
+    out["fitness"] = body.fitness;
+    out["evaluation_count"] = body.evaluation_count;
+    out["corrected"] = body.corrected;
+    out["woken"] = woken_list(body.woken);
+  }
+  void operator()(const Inhibited& body) const {
+    out["fitness"] = body.fitness;
+    out["free_share"] = body.free_share;
+    out["try_count"] = body.try_count;
+    out["evaluation_count"] = body.evaluation_count;
+    out["corrected"] = body.corrected;
+    out["due_h"] = maybe(body.due_h);
+  }
+  void operator()(const Settled& body) const {
+    out["nucleus_um"] = vec3(body.nucleus_um);
+    out["nearest_membrane_um"] = vec3(body.nearest_membrane_um);
+    out["deformed_volume_um3"] = body.deformed_volume_um3;
+    out["due_h"] = maybe(body.due_h);
+  }
+  void operator()(const Moved& body) const {
+    out["cell"] = encode_cell(body.cell);
+    out["woken"] = woken_list(body.woken);
+  }
+  void operator()(const Senesced&) const {}
+  void operator()(const Finished& body) const {
+    out["reason"] = name_of(body.reason);
+    out["cell_count"] = body.cell_count;
+  }
+};
+
+struct ToJson {
+  Json operator()(std::monostate) const { return nullptr; }
+  Json operator()(std::int64_t value) const { return value; }
+  Json operator()(double value) const { return value; }
+  Json operator()(bool value) const { return value; }
+  Json operator()(const std::string& value) const { return value; }
+};
+
+}  // namespace
+
+Json encode_field(const Field& field) { return std::visit(ToJson{}, field); }
+
+Json encode_cell(const Cell& cell) { return encode_row(cell_columns(), cell); }
+
+Json encode_event(const Event& event) {
+  Json out = {{"seq", event.seq},
+              {"time_h", event.time_h},
+              {"kind", name_of(event.kind())},
+              {"cell_id", event.cell_id ? Json(event.cell_id->value) : Json(nullptr)},
+              {"digest", event.digest.hex()}};
+  std::visit(AddBody{out}, event.body);
+  return out;
+}
+
+Json encode_progress(const Progress& progress) {
+  return {{"time_h", progress.time_h},
+          {"cells", progress.cells},
+          {"active", progress.active},
+          {"passive", progress.passive},
+          {"senescent", progress.senescent},
+          {"fraction", maybe(progress.fraction)},
+          {"cells_per_s", maybe(progress.cells_per_s)},
+          {"eta_s", maybe(progress.eta_s)}};
+}
+
+Json encode_job(const JobView& view) {
+  const JobRow& job = view.job;
+  Json labels = Json::object();
+  for (const auto& [key, value] : job.labels) labels[key] = value;
+  const std::string self = "/v1/jobs/" + job.id;
+  return {{"id", job.id},
+          {"kind", job.kind},
+          {"name", job.name},
+          {"labels", labels},
+          {"state", name_of(job.state)},
+          {"reason", text_or_null(job.reason)},
+          {"detail", text_or_null(job.detail)},
+          {"submitted_by", job.submitted_by},
+          {"created_at", job.created_at},
+          {"started_at", text_or_null(job.started_at)},
+          {"finished_at", text_or_null(job.finished_at)},
+          {"revision", job.revision},
+          // The row's own pair: digest and last_seq name the same event.
+          {"last_seq", job.last_seq},
+          {"digest", job.digest.hex()},
+          {"engine_version", job.engine_version},
+          {"origin", nullptr},
+          {"spec", Json::parse(job.spec_json)},
+          {"progress", encode_progress(view.progress)},
+          {"links",
+           {{"self", self},
+            {"events", self + "/events"},
+            {"cells", self + "/cells"},
+            {"series", self + "/series"},
+            {"image", self + "/image"},
+            {"log", self + "/log"}}}};
+}
+
+Json encode_log_row(const LogRow& row) {
+  return {{"index", row.index}, {"at", row.at}, {"level", row.level}, {"message", row.message}};
+}
+
+}  // namespace colony::server::api

@@ -1,0 +1,290 @@
+// The table of operations, and what is checked before any handler runs.
+#include "server/api/api.hpp"
+#include "server/api/openapi.hpp"
+#include "server/api/schema.hpp"
+
+namespace colony::server::api {
+namespace {
+
+constexpr double kSeqMax = 9e15;
+constexpr std::string_view kJson = "application/json";
+constexpr std::string_view kNdjson = "application/x-ndjson";
+constexpr std::string_view kCsv = "text/csv";
+
+const QueryParam kAtH = {
+    "at_h", QueryType::kNumber, 0, 1e9, {}, "model time, h: the state after all events up to it; default now"};
+
+std::vector<std::string_view> stream_kinds() {
+  std::vector<std::string_view> names;
+  for (int kind = 0; kind < kEventKindCount; ++kind) names.push_back(name_of(static_cast<EventKind>(kind)));
+  names.push_back("progress");
+  return names;
+}
+
+std::vector<std::string_view> state_names() {
+  std::vector<std::string_view> names;
+  for (int state = 0; state <= static_cast<int>(JobState::kCancelled); ++state) {
+    names.push_back(name_of(static_cast<JobState>(state)));
+  }
+  return names;
+}
+
+std::vector<Endpoint> make_endpoints() {
+  using enum ProblemKind;
+  return {
+      {"POST",
+       "/v1/jobs",
+       "submitJob",
+       "Submit a job. The header Idempotency-Key (1 to 200 printable ASCII characters) makes repeating it safe.",
+       {kJson},
+       {{"dry_run",
+         QueryType::kBoolean,
+         0,
+         0,
+         {},
+         "only check: answer the complete spec and an estimate; nothing is stored"}},
+       {{200, "the same job as before (same key and body), or the answer of a dry run"}, {201, "the new job"}},
+       "Submission",
+       {kMalformed, kUnsupportedMediaType, kKeyReused, kBusy},
+       post_job},
+      {"GET",
+       "/v1/jobs",
+       "listJobs",
+       "Jobs, newest first",
+       {kJson},
+       {{"state", QueryType::kName, 0, 0, state_names(), "only jobs in this state"},
+        {"kind", QueryType::kText, 0, 0, {}, "only jobs of this kind"},
+        {"name", QueryType::kText, 0, 0, {}, "only jobs of exactly this name"},
+        {"label", QueryType::kText, 0, 0, {}, "only jobs with this label, key:value; several must all fit", true},
+        {"limit", QueryType::kInteger, 1, kJobsPerPageMax, {}, "jobs in a page; default 50"},
+        {"cursor", QueryType::kText, 0, 0, {}, "`next` of the page before"}},
+       {{200, "a page"}},
+       "JobList",
+       {},
+       get_jobs},
+      {"GET",
+       "/v1/jobs/counts",
+       "countJobs",
+       "Count of jobs by state",
+       {kJson},
+       {},
+       {{200, "the counts"}},
+       "JobCounts",
+       {},
+       get_job_counts},
+      {"GET", "/v1/jobs/{job_id}", "showJob", "One job", {kJson}, {}, {{200, "the job"}}, "Job", {kNotFound}, get_job},
+      {"POST",
+       "/v1/jobs/{job_id}/cancel",
+       "cancelJob",
+       "End a job that has not ended; durable before the answer",
+       {kJson},
+       {},
+       {{200, "it was cancelled already"}, {202, "it is cancelled, or will be at its next event"}},
+       "Job",
+       {kMalformed, kNotFound, kJobTerminal, kUnsupportedMediaType},
+       cancel_job},
+      {"POST",
+       "/v1/jobs/{job_id}/pause",
+       "pauseJob",
+       "Hold a job; durable before the answer",
+       {kJson},
+       {},
+       {{200, "it was paused already"}, {202, "it is paused, or will be at its next event"}},
+       "Job",
+       {kMalformed, kNotFound, kJobTerminal, kUnsupportedMediaType},
+       pause_job},
+      {"POST",
+       "/v1/jobs/{job_id}/resume",
+       "resumeJob",
+       "Queue a paused job again; durable before the answer",
+       {kJson},
+       {},
+       {{200, "it was queued or running already"}, {202, "it is queued"}},
+       "Job",
+       {kMalformed, kNotFound, kJobTerminal, kUnsupportedMediaType},
+       resume_job},
+      {"DELETE",
+       "/v1/jobs/{job_id}",
+       "deleteJob",
+       "Remove an ended job with its history",
+       {},
+       {},
+       {{204, "it is gone"}},
+       "",
+       {kNotFound, kJobNotTerminal},
+       delete_job},
+      {"GET",
+       "/v1/jobs/{job_id}/events",
+       "listEvents",
+       "The history, in pages (JSON), whole (NDJSON, CSV) or live (text/event-stream, with the header Last-Event-ID)",
+       {kJson, kNdjson, kCsv, "text/event-stream"},
+       {{"after", QueryType::kInteger, 0, kSeqMax, {}, "only events with a greater seq; `next` of the page before"},
+        {"kind", QueryType::kNames, 0, 0, stream_kinds(),
+         "only these kinds, separated by commas; progress is for streams"},
+        {"cell_id", QueryType::kInteger, 1, static_cast<double>(kCellIdMax), {}, "only events of this cell"},
+        {"limit",
+         QueryType::kInteger,
+         1,
+         kEventsPerPageMax,
+         {},
+         "most events; default 1000 for JSON, else all; not for streams"}},
+       {{200, "events"}, {204, "a stream taken up again with nothing left"}},
+       "Event",
+       {kNotFound},
+       get_events},
+      {"GET",
+       "/v1/jobs/{job_id}/cells",
+       "listCells",
+       "The colony at a time, one row a cell",
+       {kJson, kCsv, kNdjson},
+       {kAtH},
+       {{200, "the cells"}},
+       "Cell",
+       {kNotFound, kTimeNotReached},
+       get_cells},
+      {"GET",
+       "/v1/jobs/{job_id}/series",
+       "listSeries",
+       "The growth curve in equal steps from 0 to the end",
+       {kJson, kCsv},
+       {{"points", QueryType::kInteger, 1, kSeriesPointsMax, {}, "rows; default 200"}},
+       {{200, "the rows"}},
+       "Series",
+       {kNotFound},
+       get_series},
+      {"GET",
+       "/v1/jobs/{job_id}/image",
+       "drawImage",
+       "A picture of the colony from above",
+       {"image/png"},
+       {kAtH,
+        {"style", QueryType::kName, 0, 0, {"shaded", "contours"}, "default shaded"},
+        {"um_per_px", QueryType::kNumber, 0.01, 1000, {}, "scale; not together with width_px"},
+        {"width_px", QueryType::kInteger, 16, 8192, {}, "width; default 1024"},
+        {"colour_by", QueryType::kName, 0, 0, {"activity", "generation", "age", "volume"}, "default activity"},
+        {"scale_bar", QueryType::kBoolean, 0, 0, {}, "default true"}},
+       {{200, "the picture"}},
+       "",
+       {kNotFound, kTimeNotReached},
+       get_image},
+      {"GET",
+       "/v1/jobs/{job_id}/log",
+       "readLog",
+       "The log of the job, a line each",
+       {kNdjson},
+       {},
+       {{200, "the log"}},
+       "LogLine",
+       {kNotFound},
+       get_log},
+      {"GET",
+       "/v1/schema/job",
+       "getJobSchema",
+       "JSON Schema (2020-12) of a job spec",
+       {kJson, "application/schema+json"},
+       {},
+       {{200, "the schema"}},
+       "",
+       {},
+       get_job_schema},
+      {"GET",
+       "/openapi.json",
+       "getOpenapi",
+       "This description",
+       {kJson},
+       {},
+       {{200, "the description"}},
+       "",
+       {},
+       get_openapi},
+      {"GET",
+       "/v1/service-info",
+       "getServiceInfo",
+       "Version, limits, presets and parameters",
+       {kJson},
+       {},
+       {{200, "facts"}},
+       "ServiceInfo",
+       {},
+       get_service_info},
+      {"GET", "/healthz", "getHealth", "Alive", {kJson}, {}, {{200, "alive"}}, "Health", {}, get_healthz},
+      {"GET",
+       "/readyz",
+       "getReadiness",
+       "Ready: database writable, disk free, not draining",
+       {kJson},
+       {},
+       {{200, "ready"}},
+       "Health",
+       {},
+       get_readyz},
+  };
+}
+
+std::string joined(std::span<const std::string_view> names) {
+  std::string out;
+  for (const std::string_view name : names) out += (out.empty() ? "" : ", ") + std::string(name);
+  return out;
+}
+
+}  // namespace
+
+std::span<const Endpoint> endpoints() {
+  static const std::vector<Endpoint> table = make_endpoints();
+  return table;
+}
+
+http::Response run_endpoint(const Endpoint& endpoint, Context& context, const http::Request& request) {
+  auto query = Query::parse(request, endpoint.query);
+  if (!query) return problem_response(query.error(), request.request_id);
+  std::string_view media;
+  if (!endpoint.media.empty()) {
+    const auto chosen = choose_media(request.headers, endpoint.media);
+    if (!chosen) {
+      return problem_response(
+          ProblemKind::kNotAcceptable,
+          {ErrorCode::kInvalid, "offered are " + joined(endpoint.media), {{"Accept", "fits nothing offered"}}},
+          request.request_id);
+    }
+    media = endpoint.media[*chosen];
+  }
+  // Asked of every POST, with a body or without: a page of another site cannot send this type unasked (CORS).
+  if (endpoint.method == "POST" && !has_json_body(request.headers)) {
+    return problem_response(ProblemKind::kUnsupportedMediaType,
+                            {ErrorCode::kInvalid,
+                             "a POST must have Content-Type: application/json",
+                             {{"Content-Type", "must be application/json"}}},
+                            request.request_id);
+  }
+  return endpoint.handler(context, Call{request, std::move(*query), media});
+}
+
+Api::Api(JobService& jobs, ApiConfig config) {
+  const SpecLimits limits{config.jobs.cells_max};
+  context_ = std::unique_ptr<Context>(new Context{jobs, std::move(config), false, {}, {}});
+  context_->schema_text = to_text(job_spec_schema(limits));
+  context_->openapi_text = to_text(openapi_document(endpoints(), limits, context_->config.version));
+}
+
+void Api::add_routes(http::Router& router) {
+  for (const Endpoint& endpoint : endpoints()) {
+    std::string pattern(endpoint.path);
+    if (const std::size_t open = pattern.find('{'); open != std::string::npos) {
+      pattern.replace(open, pattern.find('}') - open + 1, "{}");
+    }
+    router.add(std::string(endpoint.method), pattern,
+               [&endpoint, context = context_.get()](const http::Request& request) {
+                 return run_endpoint(endpoint, *context, request);
+               });
+  }
+}
+
+http::Response json_response(int status, const Json& body) {
+  http::Response response;
+  response.status = status;
+  response.headers.set("Content-Type", "application/json");
+  response.body = to_text(body);
+  return response;
+}
+
+}  // namespace colony::server::api

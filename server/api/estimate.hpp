@@ -1,0 +1,29 @@
+// estimate: what a job will roughly cost, before it runs.
+// Method:  the measured growth law of a lone colony (exponential, then linear radius) in units of the mean cycle,
+// bounded by
+//          the spec; a cost per cell in proportion to the points scored. A guess within a factor of about three, and
+//          said so.
+// Threads: pure.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+#include "engine/sim/simulator.hpp"
+#include "server/api/json.hpp"
+
+namespace colony::server::api {
+
+struct Estimate {
+  std::uint64_t cells = 0;  // at the end
+  double time_h = 0.0;      // model time at the end
+  double wall_s = 0.0;
+  std::uint64_t memory_bytes = 0;
+  std::uint64_t stored_bytes = 0;
+  std::string_view basis;  // where the figures come from
+};
+
+Estimate estimate(const RunSpec& spec);
+Json encode_estimate(const Estimate& estimate);
+
+}  // namespace colony::server::api

@@ -1,0 +1,158 @@
+// Handlers of what a job has produced: events, cells, series, image, log.
+#include <algorithm>
+#include <limits>
+
+#include "engine/picture/render.hpp"
+#include "server/api/api.hpp"
+#include "server/api/codec_event.hpp"
+#include "server/api/streams.hpp"
+
+namespace colony::server::api {
+namespace {
+
+http::Response failure(const Error& error, const Call& call) {
+  return problem_response(error, call.request.request_id);
+}
+
+Error wrong_parameter(std::string name, std::string message) {
+  return {ErrorCode::kInvalid, "query parameters are wrong", {{std::move(name), std::move(message)}}};
+}
+
+std::string content_type(std::string_view media) {
+  return media == "text/csv" ? "text/csv; charset=utf-8; header=present" : std::string(media);
+}
+
+http::Response streamed(std::string_view media, std::unique_ptr<http::BodySource> source) {
+  http::Response response;
+  response.headers.set("Content-Type", content_type(media));
+  response.stream = std::move(source);
+  return response;
+}
+
+// The kinds asked for; `progress` apart.
+void read_kinds(const Query& query, StreamWish& wish) {
+  const auto text = query.text("kind");
+  if (!text) return;
+  wish.progress = false;
+  for (const std::string& name : split(*text, ',')) {
+    if (name == "progress")
+      wish.progress = true;
+    else if (const auto kind = event_kind_from(name))
+      wish.filter.kinds.push_back(*kind);
+  }
+  wish.events = !wish.filter.kinds.empty();
+}
+
+http::Response live_stream(Context& context, const Call& call, StreamWish wish) {
+  if (call.query.has("limit")) return failure(wrong_parameter("limit", "is not for text/event-stream"), call);
+  bool is_resumed = call.query.has("after");
+  constexpr std::string_view kLastEventId = "Last-Event-ID";
+  if (call.request.headers.count(kLastEventId) > 0) {
+    const auto seq = parse_integer(*call.request.headers.get(kLastEventId));
+    if (!seq || call.request.headers.count(kLastEventId) > 1 ||
+        *seq > static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max())) {
+      return failure(
+          {ErrorCode::kInvalid, "a header is wrong", {{std::string(kLastEventId), "must be the seq of an event"}}},
+          call);
+    }
+    is_resumed = true;
+    wish.filter.after = std::max(wish.filter.after, *seq);
+  }
+  const auto view = context.jobs.show(call.id());
+  if (!view) return failure(view.error(), call);
+  if (is_resumed && is_terminal(view->job.state)) {
+    bool is_left = wish.filter.after < view->job.last_seq && !wish.events;  // progress alone: its end was not seen
+    if (wish.events) {
+      const auto rest = context.jobs.events(call.id(), wish.filter, 1);
+      if (!rest) return failure(rest.error(), call);
+      is_left = !rest->empty();
+    }
+    if (!is_left) {
+      http::Response response;
+      response.status = 204;
+      return response;
+    }
+  }
+  http::Response response =
+      streamed("text/event-stream", std::make_unique<EventStream>(context.jobs, *view, std::move(wish)));
+  response.headers.set("Cache-Control", "no-store");
+  return response;
+}
+
+template <class Enum>
+Enum enum_of(const Query& query, std::string_view name, std::initializer_list<std::string_view> names) {
+  const std::string value = query.text(name).value_or(std::string(*names.begin()));
+  return static_cast<Enum>(std::find(names.begin(), names.end(), value) - names.begin());
+}
+
+}  // namespace
+
+http::Response get_events(Context& context, const Call& call) {
+  StreamWish wish;
+  wish.filter.after = call.query.integer("after").value_or(0);
+  if (const auto cell_id = call.query.integer("cell_id")) wish.filter.cell_id = static_cast<std::uint32_t>(*cell_id);
+  read_kinds(call.query, wish);
+  if (call.media == "text/event-stream") return live_stream(context, call, std::move(wish));
+  if (call.query.has("kind") && wish.progress) {
+    return failure(wrong_parameter("kind", "progress is for Accept: text/event-stream only"), call);
+  }
+  std::optional<std::size_t> limit = call.query.integer("limit");
+  if (!limit && call.media == "application/json") limit = kEventsPerPageDefault;
+  auto first = context.jobs.events(call.id(), wish.filter, kEventsPerRead);
+  if (!first) return failure(first.error(), call);
+  return streamed(call.media, std::make_unique<EventListSource>(context.jobs, call.id(), wish.filter, limit,
+                                                                event_format(call.media), std::move(*first)));
+}
+
+http::Response get_cells(Context& context, const Call& call) {
+  auto at = context.jobs.colony_at(call.id(), call.query.number("at_h"));
+  if (!at) return failure(at.error(), call);
+  const Json facts = {{"time_h", at->time_h}, {"last_seq", at->colony->last_seq()}, {"digest", at->digest.hex()}};
+  return streamed(call.media, std::make_unique<CellListSource>(std::move(*at), cell_format(call.media, facts)));
+}
+
+http::Response get_series(Context& context, const Call& call) {
+  const auto rows = context.jobs.series(call.id(), call.query.integer("points").value_or(kSeriesPointsDefault));
+  if (!rows) return failure(rows.error(), call);
+  if (call.media == "text/csv") {
+    http::Response response;
+    response.headers.set("Content-Type", content_type(call.media));
+    append_csv_header(response.body, series_columns());
+    for (const SeriesRow& row : *rows) append_csv_row(response.body, series_columns(), row);
+    return response;
+  }
+  Json items = Json::array();
+  for (const SeriesRow& row : *rows) items.push_back(encode_row(series_columns(), row));
+  return json_response(200, {{"items", std::move(items)}, {"next", nullptr}});
+}
+
+http::Response get_image(Context& context, const Call& call) {
+  if (call.query.has("um_per_px") && call.query.has("width_px")) {
+    return failure({ErrorCode::kInvalid,
+                    "query parameters are wrong",
+                    {{"um_per_px", "not together with width_px"}, {"width_px", "not together with um_per_px"}}},
+                   call);
+  }
+  PictureSpec spec;
+  spec.style = enum_of<PictureStyle>(call.query, "style", {"shaded", "contours"});
+  spec.colour_by = enum_of<ColourBy>(call.query, "colour_by", {"activity", "generation", "age", "volume"});
+  spec.um_per_px = call.query.number("um_per_px").value_or(0.0);
+  if (const auto width = call.query.integer("width_px")) spec.width_px = static_cast<std::int64_t>(*width);
+  spec.scale_bar = call.query.boolean("scale_bar", true);
+  const auto at = context.jobs.colony_at(call.id(), call.query.number("at_h"));
+  if (!at) return failure(at.error(), call);
+  const auto picture = render(*at->colony, at->spec->params, spec);
+  if (!picture) return failure(picture.error(), call);
+  http::Response response;
+  response.headers.set("Content-Type", "image/png");
+  response.body = encode_png(*picture);
+  return response;
+}
+
+http::Response get_log(Context& context, const Call& call) {
+  auto first = context.jobs.log(call.id(), 0, kLogRowsPerRead);
+  if (!first) return failure(first.error(), call);
+  return streamed(call.media, std::make_unique<LogSource>(context.jobs, call.id(), std::move(*first)));
+}
+
+}  // namespace colony::server::api

@@ -1,0 +1,177 @@
+#include "server/api/openapi.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "server/api/schema.hpp"
+
+namespace colony::server::api {
+namespace {
+
+Json problem_answer(std::string_view description) {
+  return {{"description", description},
+          {"content", {{"application/problem+json", {{"schema", reference("Problem")}}}}}};
+}
+
+Json bound(double value) { return value == std::floor(value) ? Json(static_cast<std::int64_t>(value)) : Json(value); }
+
+Json query_schema(const QueryParam& param) {
+  switch (param.type) {
+    case QueryType::kInteger:
+    case QueryType::kNumber:
+      return {{"type", param.type == QueryType::kInteger ? "integer" : "number"},
+              {"minimum", bound(param.min)},
+              {"maximum", bound(param.max)}};
+    case QueryType::kBoolean:
+      return {{"type", "boolean"}};
+    case QueryType::kName:
+      return {{"type", "string"}, {"enum", param.names}};
+    case QueryType::kNames:
+      return {{"type", "array"}, {"items", {{"type", "string"}, {"enum", param.names}}}};
+    case QueryType::kText:
+      return {{"type", "string"}};
+  }
+  return Json::object();
+}
+
+Json parameters_of(const Endpoint& endpoint) {
+  Json parameters = Json::array();
+  if (endpoint.path.find("{job_id}") != std::string_view::npos)
+    parameters.push_back({{"$ref", "#/components/parameters/job_id"}});
+  for (const QueryParam& param : endpoint.query) {
+    Json one = {{"name", param.name}, {"in", "query"}, {"description", param.text}, {"schema", query_schema(param)}};
+    if (param.type == QueryType::kNames) {
+      one["style"] = "form";
+      one["explode"] = false;
+    } else if (param.repeatable) {
+      one["schema"] = {{"type", "array"}, {"items", query_schema(param)}};
+      one["style"] = "form";
+      one["explode"] = true;
+    }
+    parameters.push_back(std::move(one));
+  }
+  const auto header = [&](const char* name, const char* text, Json schema) {
+    parameters.push_back({{"name", name}, {"in", "header"}, {"description", text}, {"schema", std::move(schema)}});
+  };
+  if (endpoint.operation_id == "submitJob") {
+    header("Idempotency-Key", "the same key and body give the same job",
+           {{"type", "string"}, {"minLength", 1}, {"maxLength", kIdempotencyKeyBytesMax}, {"pattern", "^[ -~]+$"}});
+  }
+  if (endpoint.operation_id == "listEvents") {
+    header("Last-Event-ID", "text/event-stream: the last seq seen; of this and `after` the greater wins",
+           {{"type", "string"}, {"pattern", "^[0-9]+$"}});
+  }
+  return parameters;
+}
+
+// The schema of an answer in one media type. NDJSON is described by the schema of one line.
+Json media_schema(const Endpoint& endpoint, std::string_view media) {
+  if (media == "application/x-ndjson") return reference(endpoint.schema);
+  if (media == "application/json" || media == "application/schema+json") {
+    if (endpoint.operation_id == "listEvents") return reference("EventList");
+    if (endpoint.operation_id == "listCells") return reference("CellList");
+    if (endpoint.schema.empty()) return {{"type", "object"}};
+    return reference(endpoint.schema);
+  }
+  if (media == "image/png") return {{"type", "string"}, {"contentMediaType", "image/png"}};
+  return {{"type", "string"}};
+}
+
+Json success_answer(const Endpoint& endpoint, int status, std::string_view description) {
+  Json answer = {{"description", description}};
+  if (status != 204) {
+    for (const std::string_view media : endpoint.media) {
+      answer["content"][std::string(media)] = {{"schema", media_schema(endpoint, media)}};
+    }
+  }
+  const auto header = [&](const char* name, const char* text) {
+    answer["headers"][name] = {{"description", text}, {"schema", {{"type", "string"}}}};
+  };
+  if (endpoint.operation_id == "submitJob") header("Location", "path of the job");
+  if (endpoint.operation_id == "listJobs") header("Link", "rel=next, if there is a next page");
+  return answer;
+}
+
+// What the request gate and the checks before a handler can answer to any request.
+const std::map<int, std::string_view>& common_problems() {
+  static const std::map<int, std::string_view> table = {{400, "the request cannot be read"},
+                                                        {403, "a foreign Origin"},
+                                                        {404, "there is no such thing"},
+                                                        {405, "a method that the path does not have; see Allow"},
+                                                        {408, "the request came too slowly"},
+                                                        {413, "the body is too large"},
+                                                        {414, "the target is too long"},
+                                                        {421, "a Host that is not ours"},
+                                                        {422, "fields or parameters are wrong"},
+                                                        {431, "the header is too large"},
+                                                        {500, "a bug in the server"},
+                                                        {501, "a method or coding that is not implemented"},
+                                                        {503, "not ready or too busy; see Retry-After"},
+                                                        {505, "another HTTP version"}};
+  return table;
+}
+
+Json responses_of(const Endpoint& endpoint) {
+  std::map<int, std::string> problems;
+  for (const auto& [status, text] : common_problems()) problems[status] = text;
+  if (!endpoint.media.empty()) problems[406] = problem_row(ProblemKind::kNotAcceptable).title;
+  for (const ProblemKind kind : endpoint.problems) {
+    std::string& text = problems[problem_row(kind).status];
+    const std::string code(problem_row(kind).code);
+    text += (text.empty() ? "" : "; ") + code;
+  }
+  Json responses = Json::object();
+  for (const auto& [status, description] : endpoint.answers) {
+    responses[std::to_string(status)] = success_answer(endpoint, status, description);
+  }
+  for (const auto& [status, text] : problems) responses[std::to_string(status)] = problem_answer(text);
+  responses["default"] = problem_answer("any other problem");
+  return responses;
+}
+
+Json request_body_of(const Endpoint& endpoint) {
+  if (endpoint.operation_id == "submitJob") {
+    return {{"required", true}, {"content", {{"application/json", {{"schema", reference("JobSpec")}}}}}};
+  }
+  return {{"description", "empty, or an empty object"},
+          {"content", {{"application/json", {{"schema", {{"type", "object"}, {"maxProperties", 0}}}}}}}};
+}
+
+}  // namespace
+
+Json openapi_document(std::span<const Endpoint> table, const SpecLimits& limits, std::string_view version) {
+  Json paths = Json::object();
+  for (const Endpoint& endpoint : table) {
+    std::string method(endpoint.method);
+    std::transform(method.begin(), method.end(), method.begin(),
+                   [](char c) { return static_cast<char>(c - 'A' + 'a'); });
+    Json operation = {
+        {"operationId", endpoint.operation_id}, {"summary", endpoint.summary}, {"parameters", parameters_of(endpoint)}};
+    if (endpoint.method == "POST") operation["requestBody"] = request_body_of(endpoint);
+    operation["responses"] = responses_of(endpoint);
+    paths[std::string(endpoint.path)][method] = std::move(operation);
+  }
+  return {{"openapi", "3.1.0"},
+          {"info",
+           {{"title", "Colony"},
+            {"version", version},
+            {"summary", "Grow cell colonies as jobs; watch, fetch and measure them"},
+            {"description",
+             "Units are in names: _h, _um, _um2, _um3, _rad; wall times _at, RFC 3339 UTC. Errors are problem "
+             "documents (RFC 9457) that name every wrong field at once."}}},
+          {"jsonSchemaDialect", "https://json-schema.org/draft/2020-12/schema"},
+          {"servers", Json::array({{{"url", "/"}}})},
+          {"paths", std::move(paths)},
+          {"components",
+           {{"parameters",
+             {{"job_id",
+               {{"name", "job_id"},
+                {"in", "path"},
+                {"required", true},
+                {"description", "id of the job, a UUIDv7 in lower case"},
+                {"schema", {{"type", "string"}}}}}}},
+            {"schemas", component_schemas(limits)}}}};
+}
+
+}  // namespace colony::server::api

@@ -1,0 +1,167 @@
+#include "server/api/streams.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+namespace colony::server::api {
+namespace {
+
+constexpr auto kNoTail = [](const std::optional<std::string>&) { return std::string(); };
+
+template <class Item>
+ListFormat<Item> lines_format(Json (*encode)(const Item&)) {
+  return {"", "", [encode](std::string& out, const Item& item) { out += to_text(encode(item)) + '\n'; }, kNoTail};
+}
+
+template <class Item>
+ListFormat<Item> csv_format(std::span<const Column<Item>> columns) {
+  std::string head;
+  append_csv_header(head, columns);
+  return {head, "", [columns](std::string& out, const Item& item) { append_csv_row(out, columns, item); }, kNoTail};
+}
+
+// {<facts>, "items": [...], "next": ...}
+template <class Item>
+ListFormat<Item> envelope_format(const Json& facts, Json (*encode)(const Item&)) {
+  std::string head = to_text(facts);
+  head.pop_back();
+  head += facts.empty() ? "\"items\":[" : ",\"items\":[";
+  return {head, ",", [encode](std::string& out, const Item& item) { out += to_text(encode(item)); },
+          [](const std::optional<std::string>& next) {
+            return "],\"next\":" + (next ? to_text(Json(*next)) : std::string("null")) + "}";
+          }};
+}
+
+template <class Item>
+ListFormat<Item> format_for(std::string_view media, const Json& facts, Json (*encode)(const Item&),
+                            std::span<const Column<Item>> columns) {
+  if (media == "text/csv") return csv_format(columns);
+  if (media == "application/x-ndjson") return lines_format(encode);
+  return envelope_format(facts, encode);
+}
+
+}  // namespace
+
+ListFormat<Event> event_format(std::string_view media) {
+  return format_for(media, Json::object(), &encode_event, event_columns());
+}
+
+ListFormat<Cell> cell_format(std::string_view media, const Json& facts) {
+  return format_for(media, facts, &encode_cell, cell_columns());
+}
+
+EventListSource::EventListSource(JobService& jobs, std::string id, EventFilter filter, std::optional<std::size_t> limit,
+                                 ListFormat<Event> format, std::vector<Event> first)
+    : jobs_(jobs),
+      id_(std::move(id)),
+      filter_(std::move(filter)),
+      left_(limit),
+      format_(std::move(format)),
+      page_(std::move(first)) {}
+
+http::BodySource::Pull EventListSource::pull(std::string& out) {
+  if (is_first_) out += format_.head;
+  std::optional<std::string> next;
+  while (!page_.empty()) {
+    std::size_t used = 0;
+    for (; used < page_.size() && out.size() < kPieceBytes && left_ != std::size_t{0}; ++used) {
+      if (!std::exchange(is_first_, false)) out += format_.separator;
+      format_.append(out, page_[used]);
+      filter_.after = page_[used].seq;
+      if (left_) --*left_;
+    }
+    page_.erase(page_.begin(), page_.begin() + static_cast<std::ptrdiff_t>(used));
+    if (left_ == std::size_t{0}) {
+      // The limit is reached: there is a next page if one more event is stored already.
+      if (page_.empty()) {
+        auto more = jobs_.events(id_, filter_, 1);
+        if (!more) throw std::runtime_error("events of a list that had begun: " + more.error().message);
+        page_ = std::move(*more);
+      }
+      if (!page_.empty()) next = std::to_string(filter_.after);
+      break;
+    }
+    if (!page_.empty()) return Pull::kMore;  // the piece is full
+    auto more = jobs_.events(id_, filter_, kEventsPerRead);
+    if (!more) throw std::runtime_error("events of a list that had begun: " + more.error().message);
+    page_ = std::move(*more);
+    if (!page_.empty() && out.size() >= kPieceBytes) return Pull::kMore;
+  }
+  out += format_.tail(next);
+  return Pull::kEnd;
+}
+
+http::BodySource::Pull CellListSource::pull(std::string& out) {
+  const std::span<const Cell> cells = at_.colony->cells();
+  if (next_ == 0) out += format_.head;
+  for (; next_ < cells.size() && out.size() < kPieceBytes; ++next_) {
+    if (next_ > 0) out += format_.separator;
+    format_.append(out, cells[next_]);
+  }
+  if (next_ < cells.size()) return Pull::kMore;
+  out += format_.tail(std::nullopt);
+  return Pull::kEnd;
+}
+
+LogSource::LogSource(JobService& jobs, std::string id, std::vector<LogRow> first)
+    : jobs_(jobs), id_(std::move(id)), page_(std::move(first)) {}
+
+http::BodySource::Pull LogSource::pull(std::string& out) {
+  if (page_.empty()) return Pull::kEnd;
+  for (const LogRow& row : page_) out += to_text(encode_log_row(row)) + '\n';
+  auto more = jobs_.log(id_, page_.back().index, kLogRowsPerRead);
+  if (!more) throw std::runtime_error("the log of a list that had begun: " + more.error().message);
+  page_ = std::move(*more);
+  return page_.empty() ? Pull::kEnd : Pull::kMore;
+}
+
+EventStream::EventStream(JobService& jobs, const JobView& view, StreamWish wish, Clock clock)
+    : jobs_(jobs), id_(view.job.id), job_key_(view.job.job_key), wish_(std::move(wish)), clock_(std::move(clock)) {}
+
+void EventStream::on_ready(std::function<void()> wake) { subscription_ = jobs_.subscribe(job_key_, std::move(wake)); }
+
+void EventStream::append_progress(std::string& out, const JobView& view, bool is_last) {
+  const auto now = clock_();
+  if (!is_last && last_progress_at_ && now - *last_progress_at_ < kProgressInterval) return;
+  Json data = {{"state", name_of(view.job.state)}, {"last_seq", view.job.last_seq}};
+  data.update(encode_progress(view.progress));
+  std::string text = to_text(data);
+  if (text == last_progress_) return;
+  out += "event: progress\ndata: " + text + "\n\n";
+  last_progress_ = std::move(text);
+  last_progress_at_ = now;
+}
+
+http::BodySource::Pull EventStream::pull(std::string& out) {
+  if (std::exchange(is_first_, false)) out += "retry: 2000\n\n";
+  // The state is read before the events: a terminal state is committed with the last event, so if it is seen and no
+  // event is left after it, none will ever come.
+  const auto view = jobs_.show(id_);
+  // Deleted while it was watched, or the storage failed: without `event: end` the reader reconnects and is told.
+  if (!view) return Pull::kEnd;
+  if (wish_.events) {
+    const auto events = jobs_.events(id_, wish_.filter, kEventsPerRead);
+    if (!events) return Pull::kEnd;
+    for (const Event& event : *events) {
+      out += "event: " + std::string(name_of(event.kind())) + "\nid: " + std::to_string(event.seq) +
+             "\ndata: " + to_text(encode_event(event)) + "\n\n";
+      wish_.filter.after = event.seq;
+    }
+    if (!events->empty()) {
+      if (wish_.progress) append_progress(out, *view, false);
+      return Pull::kMore;
+    }
+  }
+  const bool is_over = is_terminal(view->job.state);
+  if (wish_.progress) append_progress(out, *view, is_over);
+  if (!is_over) return Pull::kWait;
+  // A message without data is not shown to readers, but its id counts: a reader of progress alone, whose messages have
+  // no id, then also comes back with Last-Event-ID, and gets 204.
+  const Json end = {
+      {"state", name_of(view->job.state)}, {"reason", view->job.reason}, {"last_seq", view->job.last_seq}};
+  out += "id: " + std::to_string(view->job.last_seq) + "\n\nevent: end\ndata: " + to_text(end) + "\n\n";
+  return Pull::kEnd;
+}
+
+}  // namespace colony::server::api

@@ -1,0 +1,42 @@
+// config: how colonyd is told what to do: built-in values, then a TOML file, then the environment, then flags; the
+// later wins. Promise: one table of keys drives all three. Unknown keys, wrong types and values out of range are errors
+// that name where
+//          they stand; nothing is clamped. An address that is not loopback is refused: this version has no tokens and
+//          no TLS.
+// Errors:  kInvalid; each field is "file.toml: jobs.queued_max", "COLONY_JOBS_QUEUED_MAX" or "--jobs.queued-max".
+// Threads: pure, except that the file is read.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "engine/base/result.hpp"
+#include "server/http/server.hpp"
+#include "server/jobs/service.hpp"
+#include "server/store/store.hpp"
+
+namespace colony::server {
+
+struct Config {
+  http::ServerConfig http;
+  StoreConfig store;
+  JobsConfig jobs;
+  std::uint64_t disk_free_bytes_min = 100'000'000;  // below: /readyz says not ready
+};
+
+/// Either a configuration, or a text to print before ending well (--help, --version).
+struct Invocation {
+  Config config;
+  std::string print;
+};
+
+using Environment = std::vector<std::pair<std::string, std::string>>;
+
+/// `arguments` without the program's name.
+Result<Invocation> configure(const std::vector<std::string>& arguments, const Environment& environment,
+                             std::string_view version);
+
+}  // namespace colony::server

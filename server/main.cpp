@@ -1,0 +1,132 @@
+// colonyd: wires store, jobs, api and http together, and ends them in the opposite order.
+// Exit: 0 after SIGTERM or SIGINT; 1 if it cannot start (data locked, port taken); 2 if the configuration is wrong.
+#include <csignal>
+#include <cstdio>
+#include <exception>
+#include <memory>
+#include <string>
+
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include "server/api/api.hpp"
+#include "server/config.hpp"
+#include "server/http/server.hpp"
+
+extern char** environ;
+
+namespace colony::server {
+namespace {
+
+constexpr std::int64_t kGrace_ms = 5'000;  // for answers under way; with the runners' end well within the 10 s promised
+
+Environment environment() {
+  Environment out;
+  for (char** entry = environ; *entry != nullptr; ++entry) {
+    const std::string text = *entry;
+    if (const std::size_t equals = text.find('='); equals != std::string::npos) {
+      out.emplace_back(text.substr(0, equals), text.substr(equals + 1));
+    }
+  }
+  return out;
+}
+
+std::string text_of(const Error& error) {
+  std::string text = error.message;
+  for (const FieldError& field : error.fields) text += "\n  " + field.pointer + ": " + field.message;
+  return text;
+}
+
+// Blocked in every thread (those made later inherit it) and fetched by wait_for_signal: no code of ours runs in a
+// signal handler, and a second signal while the server ends simply stays pending.
+sigset_t block_signals() {
+  sigset_t set;
+  sigemptyset(&set);
+  sigaddset(&set, SIGTERM);
+  sigaddset(&set, SIGINT);
+  pthread_sigmask(SIG_BLOCK, &set, nullptr);
+  std::signal(SIGPIPE, SIG_IGN);
+  return set;
+}
+
+int wait_for_signal(const sigset_t& set) {
+  int signal = 0;
+  while (sigwait(&set, &signal) != 0) {
+  }
+  return signal;
+}
+
+int fail(const std::string& what, const Error& error) {
+  spdlog::error("{}: {}", what, text_of(error));
+  return 1;
+}
+
+int serve(const Config& config) {
+  const sigset_t signals = block_signals();
+  auto store = Store::open(config.store);
+  if (!store) return fail("cannot open the data folder " + config.store.data_dir, store.error());
+  const auto jobs = JobService::create(**store, config.jobs, api::decode_stored_spec);
+
+  api::ApiConfig api_config;
+  api_config.version = COLONY_VERSION;
+  api_config.jobs = config.jobs;
+  api_config.body_bytes_max = config.http.body_bytes_max;
+  api_config.header_bytes_max = config.http.header_bytes_max;
+  api_config.connections_max = config.http.connections_max;
+  api_config.disk_free_bytes_min = config.disk_free_bytes_min;
+  api::Api api(*jobs, api_config);
+  http::Router router;
+  api.add_routes(router);
+  router.on_failure([](const http::Request& request, std::string_view what) {
+    spdlog::error("{} {} [{}]: {}", request.method, request.path, request.request_id, what);
+  });
+
+  auto server = http::Server::create(config.http, router, [](const http::AccessRecord& record) {
+    spdlog::info("{} {} {} {} us {} B [{}]", record.method, record.path, record.status, record.duration_us,
+                 record.body_bytes, record.request_id);
+  });
+  if (!server) return fail("cannot listen", server.error());
+  // Only now: a process that cannot serve must not take up jobs.
+  if (const Status started = jobs->start(); !started) return fail("cannot take up the jobs", started.error());
+  (*server)->run();
+  const bool is_v6 = config.http.address.find(':') != std::string::npos;
+  const std::string host = is_v6 ? "[" + config.http.address + "]" : config.http.address;
+  std::printf("listening on http://%s:%u\n", host.c_str(), static_cast<unsigned>((*server)->port()));
+  std::fflush(stdout);
+  spdlog::info("data in {}", config.store.data_dir);
+
+  const int signal = wait_for_signal(signals);
+  spdlog::info("ending on signal {}", signal);
+  api.drain();
+  (*server)->stop(kGrace_ms);
+  jobs->drain();
+  spdlog::info("ended");
+  return 0;
+}
+
+int run(int argc, char** argv) {
+  spdlog::set_default_logger(spdlog::stderr_logger_mt("colonyd"));
+  spdlog::set_pattern("%Y-%m-%dT%H:%M:%S.%eZ %l %v", spdlog::pattern_time_type::utc);
+  const auto invocation = configure(std::vector<std::string>(argv + 1, argv + argc), environment(), COLONY_VERSION);
+  if (!invocation) {
+    spdlog::error("{}", text_of(invocation.error()));
+    return 2;
+  }
+  if (!invocation->print.empty()) {
+    std::fputs(invocation->print.c_str(), stdout);
+    return 0;
+  }
+  return serve(invocation->config);
+}
+
+}  // namespace
+}  // namespace colony::server
+
+int main(int argc, char** argv) {
+  try {
+    return colony::server::run(argc, argv);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "colonyd: %s\n", error.what());
+    return 1;
+  }
+}

@@ -1,0 +1,138 @@
+// The configuration: precedence, strictness, refusals.
+#include "server/config.hpp"
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace colony::server {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+const Environment kHome = {{"HOME", "/home/someone"}};
+
+class ConfigFile {
+ public:
+  explicit ConfigFile(const std::string& text) {
+    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
+    path_ = std::filesystem::path(::testing::TempDir()) / ("colony_config_" + std::string(info->name()) + ".toml");
+    std::ofstream(path_) << text;
+  }
+  ~ConfigFile() { std::filesystem::remove(path_); }
+  std::string path() const { return path_.string(); }
+
+ private:
+  std::filesystem::path path_;
+};
+
+Result<Invocation> given(std::vector<std::string> arguments, Environment environment = kHome) {
+  return configure(arguments, environment, "1.2.3");
+}
+
+std::vector<std::string> places(const Result<Invocation>& result) {
+  std::vector<std::string> out;
+  if (!result) {
+    for (const FieldError& field : result.error().fields) out.push_back(field.pointer);
+  }
+  return out;
+}
+
+TEST(Config, HasDefaults) {
+  const auto result = given({});
+  ASSERT_TRUE(result);
+  const Config& config = result->config;
+  EXPECT_EQ(config.http.address, "127.0.0.1");
+  EXPECT_EQ(config.http.port, 8080);
+  EXPECT_EQ(config.store.data_dir, "/home/someone/.local/share/colony");
+  EXPECT_EQ(config.jobs.concurrent_max, 1u);
+  EXPECT_EQ(given({}, {{"HOME", "/h"}, {"XDG_DATA_HOME", "/x"}})->config.store.data_dir, "/x/colony");
+  EXPECT_EQ(given({}, {{"HOME", "/h"}, {"XDG_DATA_HOME", "relative"}})->config.store.data_dir,
+            "/h/.local/share/colony");
+  EXPECT_THAT(places(given({}, {})), ElementsAre("--server.data"));
+}
+
+TEST(Config, FlagsBeatEnvironmentBeatsFile) {
+  const ConfigFile file(
+      "[jobs]\nconcurrent_max = 2\nqueued_max = 20\n[limits]\ncells_max = 200\n"
+      "[server]\nlisten = \"[::1]:0\"\nallowed_hosts = [\"a.example\", \"b\"]\n");
+  Environment environment = kHome;
+  environment.emplace_back("COLONY_JOBS_QUEUED_MAX", "30");
+  environment.emplace_back("COLONY_LIMITS_CELLS_MAX", "300");
+  const auto result = given({"--config", file.path(), "--limits.cells-max", "400", "--data", "/d"}, environment);
+  ASSERT_TRUE(result) << places(result).at(0);
+  const Config& config = result->config;
+  EXPECT_EQ(config.jobs.concurrent_max, 2u);
+  EXPECT_EQ(config.jobs.queued_max, 30u);
+  EXPECT_EQ(config.jobs.cells_max, 400u);
+  EXPECT_EQ(config.http.address, "::1");
+  EXPECT_EQ(config.http.port, 0);
+  EXPECT_THAT(config.http.allowed_hosts, ElementsAre("a.example", "b"));
+  EXPECT_EQ(config.store.data_dir, "/d");
+  EXPECT_EQ(given({"--listen=127.0.0.1:9", "--jobs.concurrent-max=3"})->config.jobs.concurrent_max, 3u);
+}
+
+TEST(Config, EveryFaultInTheFileIsNamed) {
+  const ConfigFile file(
+      "colour = 1\n[jobs]\nconcurrent_max = 0\nqueued_max = \"many\"\nspeed = 3\n[weather]\nrain = true\n"
+      "[server]\nlisten = 8080\nallowed_hosts = [1]\n[limits]\ncells_max = -1\n");
+  const std::string at = file.path() + ": ";
+  EXPECT_THAT(places(given({"--config", file.path()})),
+              ::testing::UnorderedElementsAre(at + "colour", at + "jobs.concurrent_max", at + "jobs.queued_max",
+                                              at + "jobs.speed", at + "weather.rain", at + "server.listen",
+                                              at + "server.allowed_hosts", at + "limits.cells_max"));
+}
+
+TEST(Config, AFileThatIsMissingOrBrokenIsAnError) {
+  EXPECT_FALSE(given({"--config", "/no/such/file.toml"}));
+  const ConfigFile file("[jobs\n");
+  const auto result = given({"--config", file.path()});
+  EXPECT_THAT(places(result), ElementsAre(HasSubstr(file.path() + ":1")));
+}
+
+TEST(Config, UnknownOrWrongEnvironmentIsAnError) {
+  const auto with = [](const char* name, const char* value) {
+    return places(given({}, {{"HOME", "/h"}, {name, value}}));
+  };
+  EXPECT_THAT(with("COLONY_JOBS_SPEED", "1"), ElementsAre("COLONY_JOBS_SPEED"));
+  EXPECT_THAT(with("COLONY_AUTH_MODE", "required"), ElementsAre("COLONY_AUTH_MODE"));
+  EXPECT_THAT(with("COLONY_JOBS_CONCURRENT_MAX", "two"), ElementsAre("COLONY_JOBS_CONCURRENT_MAX"));
+  EXPECT_THAT(with("COLONY_JOBS_CONCURRENT_MAX", ""), ElementsAre("COLONY_JOBS_CONCURRENT_MAX"));
+  EXPECT_THAT(with("COLONY_SERVER", "http://x"), ElementsAre()) << "belongs to the command line";
+}
+
+TEST(Config, WrongFlagsAreErrors) {
+  EXPECT_FALSE(given({"--colour", "red"}));
+  EXPECT_FALSE(given({"stray"}));
+  EXPECT_FALSE(given({"--jobs.concurrent-max"}));
+  EXPECT_THAT(places(given({"--jobs.concurrent-max", "-1"})).size(), 1u);
+  EXPECT_THAT(places(given({"--jobs.concurrent-max", "257"})), ElementsAre("--jobs.concurrent-max"));
+}
+
+TEST(Config, OnlyLoopbackIsListenedOn) {
+  for (const char* right : {"127.0.0.1:0", "127.1.2.3:80", "[::1]:65535", "localhost:1"}) {
+    EXPECT_TRUE(given({"--listen", right})) << right;
+  }
+  for (const char* wrong :
+       {"0.0.0.0:8080", "192.168.1.1:8080", "[::]:80", "example.org:80", "127.0.0.1", "127.0.0.1:", ":80",
+        "127.0.0.1:65536", "127.0.0.1:x", "127.0.0:80", "127.0.0.256:80", "127.0.0.1.example.org:80", ""}) {
+    EXPECT_THAT(places(given({"--listen", wrong})), ElementsAre("--server.listen")) << wrong;
+  }
+  EXPECT_THAT(given({"--listen", "0.0.0.0:80"}).error().fields.at(0).message, HasSubstr("tokens and TLS"));
+}
+
+TEST(Config, HelpAndVersion) {
+  EXPECT_EQ(given({"--version"})->print, "colonyd 1.2.3\n");
+  const std::string help = given({"--help"})->print;
+  for (const char* word : {"--jobs.concurrent-max", "COLONY_JOBS_CONCURRENT_MAX", "--listen", "--data", "--config"}) {
+    EXPECT_THAT(help, HasSubstr(word));
+  }
+}
+
+}  // namespace
+}  // namespace colony::server
