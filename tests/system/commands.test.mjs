@@ -88,20 +88,4 @@ test('commands', async (t) => {
     assert.equal((await command(next, runs, 'cancel')).status, 202);
     await reached(next, waits, 'succeeded');
   });
-
-  await t.test('Prefer: wait answers when the revision changes, not before', async () => {
-    const next = await startServer(t);
-    const { id } = await submit(next, endless(14));
-    await grown(next, id, 3);
-    assert.equal((await command(next, id, 'pause')).status, 202);
-    await reached(next, id, 'paused');
-    const seen = await next.get(`/v1/jobs/${id}`);
-    assert.ok(seen.headers.etag, 'a job has an ETag');
-    const waiting = next.get(`/v1/jobs/${id}`, { Prefer: 'wait=60', 'If-None-Match': seen.headers.etag });
-    assert.equal((await command(next, id, 'cancel')).status, 202);
-    const answer = await waiting;
-    assert.deepEqual([answer.status, answer.json?.state], [200, 'cancelled'], 'an answer before the change would say paused');
-    const over = await next.get(`/v1/jobs/${id}`, { Prefer: 'wait=1', 'If-None-Match': answer.headers.etag });
-    assert.equal(over.status, 304, 'nothing changed in the time given');
-  });
 });

@@ -154,17 +154,6 @@ test('a finished job', async (t) => {
     assert.equal(scaled.status, 200);
   });
 
-  await t.test('derived answers carry an ETag that is their name', async () => {
-    for (const what of ['image?width_px=100', 'cells', 'series']) {
-      const first = await server.get(`${base}/${what}`);
-      assert.match(first.headers.etag ?? '', /^(W\/)?"[^"]+"$/, what);
-      const again = await server.get(`${base}/${what}`, { 'If-None-Match': first.headers.etag });
-      assert.deepEqual([again.status, again.body.length], [304, 0], what);
-    }
-    const other = await server.get(`${base}/image?width_px=101`);
-    assert.notEqual(other.headers.etag, (await server.get(`${base}/image?width_px=100`)).headers.etag);
-  });
-
   await t.test('keeps a log', async () => {
     const log = lines((await server.get(`${base}/log`)).text);
     assert.ok(log.length >= 1);
@@ -175,10 +164,6 @@ test('a finished job', async (t) => {
     const head = await server.request('HEAD', base);
     assert.deepEqual([head.status, head.body.length], [200, 0]);
     assert.equal(head.headers['content-type'], (await server.get(base)).headers['content-type']);
-  });
-
-  await t.test('has an ETag of its revision and its last event', async () => {
-    assert.equal((await server.get(base)).headers.etag, `"${job.revision}.${job.last_seq}"`);
   });
 
   await t.test('comes out the same from the same spec and seed, and differently from another seed', async () => {

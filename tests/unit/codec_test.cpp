@@ -172,7 +172,7 @@ TEST(Spec, RoundTripsWithEveryParameter) {
           "model": {"founders": {"count": 3}}})",
       with_model(
           R"({"founders": {"positions_um": [[0.1, -3e2], [123.456789012345678, 7]]},
-              "division": {"generation_limit": null}, 
+              "division": {"generation_limit": null},
               "search": {"mutation_rate": 0.123456789012345678}, "cycle": {"mean_h": 12.000000000000002}})"),
   };
   for (const std::string& text : texts) {
