@@ -13,7 +13,7 @@
 #include "engine/random/stream.hpp"
 #include "engine/shape/body.hpp"
 
-namespace colony::test {
+namespace colony::testing {
 
 /// Draws for test case `number`; purposes of the engine do not matter here.
 inline Stream case_stream(std::uint32_t number, std::uint32_t lane = 0) {
@@ -73,4 +73,4 @@ inline BodyGeometry sphere(double radius_um, const Vec3& centre_um) {
 
 inline double ellipsoid_volume_um3(const Vec3& s) { return 4.0 / 3.0 * maths::kPi * s.x() * s.y() * s.z(); }
 
-}  // namespace colony::test
+}  // namespace colony::testing

@@ -7,7 +7,7 @@
 
 #include "engine/sim/simulator.hpp"
 
-namespace colony::test {
+namespace colony::testing {
 
 struct Run {
   Simulator simulator;
@@ -45,4 +45,4 @@ inline std::vector<const Body*> neighbours_of(const Colony& colony, CellId id) {
   return bodies;
 }
 
-}  // namespace colony::test
+}  // namespace colony::testing

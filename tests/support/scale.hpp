@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <string_view>
 
-namespace colony::test {
+namespace colony::testing {
 
 inline bool full_run() {
   const char* value = std::getenv("COLONY_TEST_FULL");
@@ -17,4 +17,4 @@ T scaled(T reduced, T full) {
   return full_run() ? full : reduced;
 }
 
-}  // namespace colony::test
+}  // namespace colony::testing

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <vector>
 
-namespace colony::test {
+namespace colony::testing {
 
 struct Mean {
   double value = 0.0;
@@ -69,4 +69,4 @@ inline double chi_square_bound(std::size_t degrees) {
   return k * t * t * t;
 }
 
-}  // namespace colony::test
+}  // namespace colony::testing

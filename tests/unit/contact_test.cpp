@@ -16,19 +16,19 @@ constexpr std::array<ContactRule, 2> kRules = {ContactRule::kSum, ContactRule::k
 TEST(Contact, TheFaceOfEqualParallelEllipsoidsIsThePlaneOfEqualFields) {
   // Noise-free and parallel: f_i - f_j is linear, the face lies half way, across the line of centres in the cells' frame.
   for (std::uint32_t number = 1; number <= 20; ++number) {
-    Stream stream = test::case_stream(number);
-    BodyGeometry g = test::any_ellipsoid(stream, 0.0);
+    Stream stream = testing::case_stream(number);
+    BodyGeometry g = testing::any_ellipsoid(stream, 0.0);
     g.centre_um = Vec3(0.0, 0.0, 60.0);
-    const Body a(g, test::smooth());
+    const Body a(g, testing::smooth());
     const Mat3 from_unit = a.to_unit().inverse();
-    const Vec3 shift = from_unit * (1.0 * test::unit_vector(stream));  // overlapping: one semiaxis apart
+    const Vec3 shift = from_unit * (1.0 * testing::unit_vector(stream));  // overlapping: one semiaxis apart
     g.centre_um += shift;
-    const Body b(g, test::smooth());
+    const Body b(g, testing::smooth());
     const Vec3 apart = a.to_unit() * shift;  // in the unit frame
     const Vec3 middle = 0.5 * (a.centre_um() + b.centre_um());
     const std::array<const Body*, 1> near_a = {&b}, near_b = {&a};
     for (int i = 0; i < 2000; ++i) {
-      const Vec3 p = middle + from_unit * (1.5 * stream.uniform() * test::unit_vector(stream));
+      const Vec3 p = middle + from_unit * (1.5 * stream.uniform() * testing::unit_vector(stream));
       const double side = apart.dot(a.to_unit() * (p - middle));  // > 0: nearer to b
       if (std::abs(side) < 1e-9) continue;
       for (const ContactRule rule : kRules) {
@@ -43,13 +43,13 @@ TEST(Contact, EachOfTwoEqualParallelEllipsoidsLosesHalfTheLens) {
   const double x = 1.2;  // distance in semiaxes
   const double lens = (4.0 + x) * (2.0 - x) * (2.0 - x) / 16.0;
   const BodyGeometry g{Vec3(0, 0, 60), Vec3(12, 8, 5), Vec3(0.3, -0.2, 0.9), Vec3::Zero()};
-  const Body a(g, test::smooth());
+  const Body a(g, testing::smooth());
   BodyGeometry h = g;
   h.centre_um += a.to_unit().inverse() * (x * Vec3(0.6, 0.0, 0.8));
-  const Body b(h, test::smooth());
+  const Body b(h, testing::smooth());
   const std::array<const Body*, 1> near_a = {&b}, near_b = {&a};
-  const PointSet points = test::points(65'536, 1);
-  const double full = test::ellipsoid_volume_um3(g.semiaxes_um);
+  const PointSet points = testing::points(65'536, 1);
+  const double full = testing::ellipsoid_volume_um3(g.semiaxes_um);
   for (const ContactRule rule : kRules) {
     EXPECT_NEAR(deformed_mass(a, near_a, rule, points).volume_um3 / full, 1.0 - 0.5 * lens, 0.002);
     EXPECT_NEAR(deformed_mass(b, near_b, rule, points).volume_um3 / full, 1.0 - 0.5 * lens, 0.002);
@@ -58,8 +58,8 @@ TEST(Contact, EachOfTwoEqualParallelEllipsoidsLosesHalfTheLens) {
 
 TEST(Contact, NoisyNeighboursShareTheirFaceWithoutGapOrOverlap) {
   for (std::uint32_t number = 1; number <= 30; ++number) {
-    Stream stream = test::case_stream(number);
-    const Body a(test::spread_cell(stream, 0.0, 0.0, 0.0), test::rough()), b(test::spread_cell(stream, 10.0, 0.0, 2.0), test::rough());
+    Stream stream = testing::case_stream(number);
+    const Body a(testing::spread_cell(stream, 0.0, 0.0, 0.0), testing::rough()), b(testing::spread_cell(stream, 10.0, 0.0, 2.0), testing::rough());
     const std::array<const Body*, 1> near_a = {&b}, near_b = {&a};
     for (int i = 0; i < 2000; ++i) {
       const Vec3 p(stream.uniform({-15, 25}), stream.uniform({-15, 15}), stream.uniform({0, 8}));
@@ -75,10 +75,10 @@ TEST(Contact, NoisyNeighboursShareTheirFaceWithoutGapOrOverlap) {
 
 TEST(Contact, DeformedContainsIsTheSignOfTheDeformedField) {
   for (std::uint32_t number = 1; number <= 200; ++number) {
-    Stream stream = test::case_stream(number);
-    const Body body(test::spread_cell(stream, 0.0, 0.0, 0.0), test::rough());
+    Stream stream = testing::case_stream(number);
+    const Body body(testing::spread_cell(stream, 0.0, 0.0, 0.0), testing::rough());
     std::vector<Body> others;
-    for (int k = 0; k < 4; ++k) others.emplace_back(test::spread_cell(stream, 0.0, 0.0, 12.0), test::rough());
+    for (int k = 0; k < 4; ++k) others.emplace_back(testing::spread_cell(stream, 0.0, 0.0, 12.0), testing::rough());
     std::vector<const Body*> near;
     for (const Body& other : others) near.push_back(&other);
     for (int i = 0; i < 200; ++i) {
@@ -104,7 +104,7 @@ double void_share(double spacing, ContactRule rule, int side) {
   for (int i = -4; i <= 4; ++i) {
     for (int j = -4; j <= 4; ++j) {
       const Vec3 centre(spacing * (i + 0.5 * j), spacing * std::sqrt(0.75) * j, z);
-      discs.emplace_back(test::sphere(radius, centre), test::smooth());
+      discs.emplace_back(testing::sphere(radius, centre), testing::smooth());
     }
   }
   int covered = 0, empty = 0;
@@ -133,7 +133,7 @@ double void_share(double spacing, ContactRule rule, int side) {
 }
 
 TEST(Contact, SumLeavesTheStatedVoidsBetweenHexagonalDiscs) {
-  const int side = test::scaled(150, 600);
+  const int side = testing::scaled(150, 600);
   EXPECT_EQ(void_share(1.80, ContactRule::kSum, side), 0.0);
   EXPECT_EQ(void_share(std::sqrt(3.0), ContactRule::kSum, side), 0.0);
   EXPECT_NEAR(void_share(1.60, ContactRule::kSum, side), 0.007, 0.001);

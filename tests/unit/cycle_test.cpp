@@ -49,7 +49,7 @@ TEST(Cycle, NormalCyclesDoubleThePopulationIn11887Hours) {
   EXPECT_LE(*high, 18.0);
   EXPECT_LT(*low, 6.1);    // the tails are cut, not missing
   EXPECT_GT(*high, 17.9);
-  const test::Mean mean = test::mean_of(times);
+  const testing::Mean mean = testing::mean_of(times);
   EXPECT_NEAR(mean.value, 12.0, 5.0 * mean.se);
   // sd of a normal truncated at 3 sd: 2 sqrt(1 - 2 * 3 phi(3) / (2 Phi(3) - 1)) = 1.97331.
   EXPECT_NEAR(mean.se * std::sqrt(static_cast<double>(times.size())), 1.9733, 0.007);
@@ -66,7 +66,7 @@ TEST(Cycle, UniformCyclesDoubleThePopulationIn11961Hours) {
 }
 
 TEST(Cycle, SiblingsCorrelateAsAskedAndKeepTheMarginalDistribution) {
-  const std::uint32_t pairs = test::scaled(60'000U, 500'000U);
+  const std::uint32_t pairs = testing::scaled(60'000U, 500'000U);
   for (const CycleDistribution distribution : {CycleDistribution::kNormal, CycleDistribution::kUniform}) {
     for (const double asked : {0.0, 0.3, 0.6, 0.9}) {
       CycleParams cycle;
@@ -78,7 +78,7 @@ TEST(Cycle, SiblingsCorrelateAsAskedAndKeepTheMarginalDistribution) {
         a.push_back(own);
         b.push_back(daughter);
       }
-      const test::Mean ma = test::mean_of(a), mb = test::mean_of(b);
+      const testing::Mean ma = testing::mean_of(a), mb = testing::mean_of(b);
       double sab = 0.0, saa = 0.0, sbb = 0.0;
       for (std::size_t i = 0; i < a.size(); ++i) {
         sab += (a[i] - ma.value) * (b[i] - mb.value);

@@ -20,19 +20,19 @@ TEST(SplittingPlane, AngleErrorAgainstTheShortAxisFallsWithElongation) {
   // A smooth, untilted, spread cell: the membrane nearest to its nucleus lies at the ends of the short axis, which 4,096 points
   // find to within this error. The model's 21 deg at 1.1 and 14 deg at 1.3 are what nine cells of ten stay below.
   struct Row { double elongation, mean_deg, ninth_decile_deg; };
-  const std::uint32_t repeats = test::scaled(400U, 4000U);
+  const std::uint32_t repeats = testing::scaled(400U, 4000U);
   for (const Row& row : {Row{1.1, 9.9, 20.5}, Row{1.3, 7.0, 14.2}, Row{1.5, 6.3, 12.9}, Row{1.7, 5.8, 11.6}}) {
     std::vector<double> errors;
     for (std::uint32_t k = 1; k <= repeats; ++k) {
-      Stream stream = test::case_stream(k);
+      Stream stream = testing::case_stream(k);
       BodyGeometry g;
       g.semiaxes_um = semiaxes_um(stream.uniform({400, 1800}), row.elongation, stream.uniform({0.3, 0.6}));
       const double turn = stream.uniform({0.0, maths::kPi});
       g.rotation_rad = Vec3(0.0, 0.0, turn);
       g.centre_um = Vec3(3.0, -2.0, spread_height_um(g.semiaxes_um));
-      const Body body(g, test::smooth());
+      const Body body(g, testing::smooth());
       const Vec3 c = centroid_above_dish_um(g);
-      const auto m = nearest_membrane_um(body, {}, ContactRule::kSum, c, test::points(kMembranePoints, k));
+      const auto m = nearest_membrane_um(body, {}, ContactRule::kSum, c, testing::points(kMembranePoints, k));
       ASSERT_TRUE(m);
       ASSERT_FALSE(body.contains(*m));
       ASSERT_GE(m->z(), 0.0);
@@ -41,7 +41,7 @@ TEST(SplittingPlane, AngleErrorAgainstTheShortAxisFallsWithElongation) {
       const Vec3 normal = *splitting_normal(c, *m);
       errors.push_back(std::asin(std::min(1.0, std::abs(normal.dot(short_axis)))) * 180.0 / maths::kPi);
     }
-    const test::Mean mean = test::mean_of(errors);
+    const testing::Mean mean = testing::mean_of(errors);
     std::sort(errors.begin(), errors.end());
     const double ninth_decile = errors[errors.size() * 9 / 10];
     std::printf("A/B %.1f: mean angle error %.2f +- %.2f deg, 90 %% below %.1f deg\n", row.elongation, mean.value, mean.se, ninth_decile);
@@ -52,9 +52,9 @@ TEST(SplittingPlane, AngleErrorAgainstTheShortAxisFallsWithElongation) {
 
 TEST(SplittingPlane, NormalIsHorizontalUnitAndAcrossTheLineToTheMembrane) {
   for (std::uint32_t number = 1; number <= 1000; ++number) {
-    Stream stream = test::case_stream(number);
+    Stream stream = testing::case_stream(number);
     const Vec3 c(stream.uniform({-50, 50}), stream.uniform({-50, 50}), 3.0);
-    const Vec3 m = c + stream.uniform({0.01, 10.0}) * test::unit_vector(stream);
+    const Vec3 m = c + stream.uniform({0.01, 10.0}) * testing::unit_vector(stream);
     const auto n = splitting_normal(c, m);
     ASSERT_TRUE(n);
     EXPECT_EQ(n->z(), 0.0);
@@ -66,12 +66,12 @@ TEST(SplittingPlane, NormalIsHorizontalUnitAndAcrossTheLineToTheMembrane) {
 
 TEST(SplittingPlane, NearestMembraneIsTheNearestOfThePointsOutside) {
   for (std::uint32_t number = 1; number <= 20; ++number) {
-    Stream stream = test::case_stream(number);
-    const BodyGeometry g = test::spread_cell(stream, 0, 0, 0);
-    const Body body(g, test::rough()), other(test::spread_cell(stream, 9.0, 0, 0), test::rough());
+    Stream stream = testing::case_stream(number);
+    const BodyGeometry g = testing::spread_cell(stream, 0, 0, 0);
+    const Body body(g, testing::rough()), other(testing::spread_cell(stream, 9.0, 0, 0), testing::rough());
     const std::array<const Body*, 1> near = {&other};
     const Vec3 c = centroid_above_dish_um(g);
-    const PointSet points = test::points(1024, number);
+    const PointSet points = testing::points(1024, number);
     const auto found = nearest_membrane_um(body, near, ContactRule::kSum, c, points);
     const double low = std::max(0.0, c.z() - 0.3 * g.semiaxes_um.z()), high = c.z() + 0.3 * g.semiaxes_um.z();
     double least = 1e9;
@@ -122,7 +122,7 @@ TEST(Chromosome, FlipChangesOneBitCountedFromTheMostSignificantOfTheFirstGene) {
 }
 
 TEST(Chromosome, CrossoverTakesTheHeadOfOneAndTheTailOfTheOther) {
-  Stream stream = test::case_stream(1);
+  Stream stream = testing::case_stream(1);
   for (const int bits : {4, 7, 8, 16}) {
     const Chromosome a = random_chromosome(bits, stream), b = random_chromosome(bits, stream);
     const auto bit_of = [&](const Chromosome& c, int bit) { return (c.code(bit / bits) >> (bits - 1 - bit % bits)) & 1U; };
@@ -164,7 +164,7 @@ bool within(const Interval& range, double value) {
 }
 
 RC_GTEST_PROP(Decode, EveryStringIsAPairInsideAllRangesAndInsideTheSearchReach, (std::uint32_t number)) {
-  Stream stream = test::case_stream(number);
+  Stream stream = testing::case_stream(number);
   const Params p = any_params(stream);
   RC_ASSERT(validate(p).empty());
   const double reach = search_reach_um(p), extent = body_half_extent_max_um(p);
@@ -187,7 +187,7 @@ RC_GTEST_PROP(Decode, EveryStringIsAPairInsideAllRangesAndInsideTheSearchReach, 
     for (std::size_t k = 0; k < 2; ++k) {
       const BodyGeometry& g = pair.bodies[k];
       const double mean = std::sqrt(g.semiaxes_um.x() * g.semiaxes_um.y());
-      volumes[k] = test::ellipsoid_volume_um3(g.semiaxes_um);
+      volumes[k] = testing::ellipsoid_volume_um3(g.semiaxes_um);
       RC_ASSERT(within(p.cell.elongation, g.semiaxes_um.x() / g.semiaxes_um.y()));
       RC_ASSERT(within(p.cell.flatness, g.semiaxes_um.z() / mean));
       RC_ASSERT(g.noise_offset == frame.noise_offsets[k]);
@@ -215,7 +215,7 @@ TEST(Decode, TheUnturnedCandidateStandsAcrossTheGivenPlane) {
   Params p;
   for (const Coding coding : {Coding::kGray, Coding::kBinary}) {
     p.search.coding = coding;
-    Stream stream = test::case_stream(5);
+    Stream stream = testing::case_stream(5);
     Chromosome chromosome = random_chromosome(8, stream);
     chromosome.set_code(kTurn, code_of(0.5, 8, coding));
     PairFrame frame;

@@ -23,7 +23,7 @@ double ulps(double got, long double expected) {
 
 template <class Ours, class Exact, class Draw>
 double worst_ulps(Ours&& ours, Exact&& exact, Draw&& draw) {
-  Stream stream = test::case_stream(1);
+  Stream stream = testing::case_stream(1);
   double worst = 0.0;
   for (int i = 0; i < kDraws; ++i) {
     const double x = draw(stream);

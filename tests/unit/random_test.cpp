@@ -63,7 +63,7 @@ TEST(Stream, SeedZeroAndTheLargestSeedAreSeedsLikeAnyOther) {
 }
 
 TEST(Stream, UniformHasMeanAndVarianceOfTheUnitInterval) {
-  const int n = test::scaled(200'000, 2'000'000);
+  const int n = testing::scaled(200'000, 2'000'000);
   Stream stream(11, CellId{1}, 0, Purpose::kCycle);
   double sum = 0.0, squares = 0.0;
   for (int i = 0; i < n; ++i) {
@@ -78,24 +78,24 @@ TEST(Stream, UniformHasMeanAndVarianceOfTheUnitInterval) {
 }
 
 TEST(Stream, BelowIsUnbiasedAlsoWhereTheRangeDoesNotDivideTheWord) {
-  const int n = test::scaled(60'000, 1'000'000);
+  const int n = testing::scaled(60'000, 1'000'000);
   for (const std::uint32_t range : {2U, 3U, 7U, 10U}) {
     Stream stream(12, CellId{range}, 0, Purpose::kCycle);
     std::vector<double> counts(range, 0.0);
     for (int i = 0; i < n; ++i) counts[stream.below(range)] += 1.0;
-    EXPECT_LT(test::chi_square_uniform(counts), test::chi_square_bound(range - 1)) << range;
+    EXPECT_LT(testing::chi_square_uniform(counts), testing::chi_square_bound(range - 1)) << range;
   }
   // With 3 * 2^30 results four words fall on three results: without rejection one residue would come twice as often.
   Stream stream(12, CellId{99}, 0, Purpose::kCycle);
   std::vector<double> residues(3, 0.0);
   for (int i = 0; i < n; ++i) residues[stream.below(3U << 30) % 3] += 1.0;
-  EXPECT_LT(test::chi_square_uniform(residues), test::chi_square_bound(2));
+  EXPECT_LT(testing::chi_square_uniform(residues), testing::chi_square_bound(2));
   EXPECT_EQ(stream.below(1), 0U);
   EXPECT_THROW(stream.below(0), CheckFailure);
 }
 
 TEST(Stream, NormalHasTheFirstFourMoments) {
-  const int n = test::scaled(200'000, 2'000'000);
+  const int n = testing::scaled(200'000, 2'000'000);
   Stream stream(13, CellId{1}, 0, Purpose::kCycle);
   double m1 = 0.0, m2 = 0.0, m3 = 0.0, m4 = 0.0;
   for (int i = 0; i < n; ++i) {
@@ -150,7 +150,7 @@ RC_GTEST_PROP(OwenScrambling, KeepsElementaryIntervals, (std::uint32_t x, std::u
 TEST(OwenScrambling, DiffersBySeedAndFillsTheInterval) {
   std::vector<double> counts(16, 0.0);
   for (std::uint32_t seed = 0; seed < 16'000; ++seed) counts[owen_scramble(0, seed * 2654435761U) >> 28] += 1.0;
-  EXPECT_LT(test::chi_square_uniform(counts), test::chi_square_bound(15));
+  EXPECT_LT(testing::chi_square_uniform(counts), testing::chi_square_bound(15));
 }
 
 std::vector<std::uint32_t> column(const std::vector<float>& values) {

@@ -18,8 +18,8 @@
 namespace colony {
 namespace {
 
-const test::Run& crowded() {
-  static const test::Run run = test::run(test::spec_of(3, 60));
+const testing::Run& crowded() {
+  static const testing::Run run = testing::run(testing::spec_of(3, 60));
   return run;
 }
 
@@ -46,7 +46,7 @@ double fitness_again(const Colony& colony, const Params& params, const SearchTas
     }
     OverlapScratch scratch;
     OverlapCounts counts;
-    count_overlaps(body, near, params.dish.radius_um, test::points(16'384, 5), scratch, counts);
+    count_overlaps(body, near, params.dish.radius_um, testing::points(16'384, 5), scratch, counts);
     least = std::min(least, counts.fitness());
   }
   return least;
@@ -122,7 +122,7 @@ TEST(Search, SmallestAndLargestSettingsRun) {
 }
 
 TEST(Search, GeneticSearchFindsBetterPlacesThanRandomAndSobolWithTheSameEvaluations) {
-  const std::uint32_t searches = test::scaled(180U, 600U);
+  const std::uint32_t searches = testing::scaled(180U, 600U);
   const Colony& colony = crowded().colony();
   std::vector<double> against_random, against_sobol, genetic;
   for (std::uint32_t k = 1; k <= searches; ++k) {
@@ -138,7 +138,7 @@ TEST(Search, GeneticSearchFindsBetterPlacesThanRandomAndSobolWithTheSameEvaluati
     against_random.push_back(g - r);
     against_sobol.push_back(g - s);
   }
-  const test::Mean g = test::mean_of(genetic), r = test::mean_of(against_random), s = test::mean_of(against_sobol);
+  const testing::Mean g = testing::mean_of(genetic), r = testing::mean_of(against_random), s = testing::mean_of(against_sobol);
   std::printf("%u searches of 528 evaluations in a colony of 60: genetic %.3f +- %.3f, above random %.3f +- %.3f, above Sobol %.3f +- %.3f\n",
               searches, g.value, g.se, r.value, r.se, s.value, s.se);
   EXPECT_GT(r.value, 3.0 * r.se);
@@ -162,7 +162,7 @@ TEST(Search, NoWinnerWithFitnessCrossesTheDishWall) {
     for (const BodyGeometry& g : found.pair.bodies) {
       const Body body(g, params.noise);
       const Box& box = body.box();
-      const PointSet points = test::points(4096, k);
+      const PointSet points = testing::points(4096, k);
       std::uint32_t inside = 0, beyond = 0;
       for (std::size_t i = 0; i < points.size(); ++i) {
         const Vec3 p = box.low + Vec3(points.x[i], points.y[i], points.z[i]).cwiseProduct(box.high - box.low);
@@ -195,7 +195,7 @@ TEST(Search, NeighboursKeepTheShareThatIsAsked) {
       const Box& box = colony.body(cell.id).box();
       if (cell.id == task.cell_id || (!meets(box, a.box()) && !meets(box, b.box()))) continue;
       ++asked;
-      EXPECT_GE(retained_share(colony, params.contact.rule, cell.id, task.cell_id, added, test::points(4096, k)), 0.9 - 0.06)
+      EXPECT_GE(retained_share(colony, params.contact.rule, cell.id, task.cell_id, added, testing::points(4096, k)), 0.9 - 0.06)
           << "search " << k << " neighbour " << cell.id.value;  // 256 points decided, 4,096 look again
     }
   }
@@ -205,18 +205,18 @@ TEST(Search, NeighboursKeepTheShareThatIsAsked) {
 TEST(RetainedShare, IsOneAloneAndFallsUnderPressure) {
   const Colony& colony = crowded().colony();
   for (const Cell& cell : colony.cells()) {
-    const double with_all = retained_share(colony, ContactRule::kSum, cell.id, std::nullopt, {}, test::points(1024, 1));
-    const double by_max = retained_share(colony, ContactRule::kMax, cell.id, std::nullopt, {}, test::points(1024, 1));
+    const double with_all = retained_share(colony, ContactRule::kSum, cell.id, std::nullopt, {}, testing::points(1024, 1));
+    const double by_max = retained_share(colony, ContactRule::kMax, cell.id, std::nullopt, {}, testing::points(1024, 1));
     EXPECT_LE(with_all, by_max);  // `sum` takes at least what `max` takes
     EXPECT_GT(with_all, 0.0);
     EXPECT_LE(by_max, 1.0);
   }
-  const test::Run alone = test::run([] { RunSpec s = test::spec_of(1, 1); return s; }());
-  EXPECT_EQ(retained_share(alone.colony(), ContactRule::kSum, CellId{1}, std::nullopt, {}, test::points(1024, 1)), 1.0);
+  const testing::Run alone = testing::run([] { RunSpec s = testing::spec_of(1, 1); return s; }());
+  EXPECT_EQ(retained_share(alone.colony(), ContactRule::kSum, CellId{1}, std::nullopt, {}, testing::points(1024, 1)), 1.0);
 }
 
 TEST(FreeShare, OfALoneCellIsTheDiscWithoutItsShadow) {
-  const test::Run alone = test::run(test::spec_of(1, 1));
+  const testing::Run alone = testing::run(testing::spec_of(1, 1));
   const Cell& cell = alone.colony().cell(CellId{1});
   const Params params;
   std::vector<double> shares;
@@ -229,7 +229,7 @@ TEST(FreeShare, OfALoneCellIsTheDiscWithoutItsShadow) {
     }
   }
   ASSERT_GT(total, 0);
-  const test::Mean mean = test::mean_of(shares);
+  const testing::Mean mean = testing::mean_of(shares);
   EXPECT_NEAR(mean.value, 1.0 - inside * 0.01 / (maths::kPi * 18.0 * 18.0), 4.0 * mean.se + 0.001);
   EXPECT_EQ(free_share(alone.colony(), params, 1, cell, 7, {cell.id, {}}), 1.0);  // after it has gone
   EXPECT_EQ(free_share(alone.colony(), params, 1, cell, 7, {}), free_share(alone.colony(), params, 1, cell, 7, {}));

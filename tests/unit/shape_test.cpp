@@ -13,7 +13,7 @@
 namespace colony {
 namespace {
 
-using test::case_stream;
+using testing::case_stream;
 
 TEST(Noise, NeverExceedsItsBoundAndComesNearIt) {
   // Directed search: sin(q u) = 1 at u = (pi/2 + 2 pi k) / q; over k = 0..26 the second sine's phase takes 27 evenly spaced values,
@@ -42,7 +42,7 @@ TEST(Noise, NeverExceedsItsBoundAndComesNearIt) {
 }
 
 TEST(Noise, IsBoundedOddAndPeriodicWithRms0804) {
-  const int n = test::scaled(100'000, 1'000'000);
+  const int n = testing::scaled(100'000, 1'000'000);
   for (const NoiseParams& p : {NoiseParams{0.40, 5.0, 1.4}, NoiseParams{0.45, 2.0, 0.3}, NoiseParams{0.2, 8.0, 6.0}}) {
     const double period = noise_period(p);
     EXPECT_DOUBLE_EQ(period, 54.0 * maths::kPi / p.frequency);
@@ -66,7 +66,7 @@ TEST(Noise, IsBoundedOddAndPeriodicWithRms0804) {
 
 RC_GTEST_PROP(Rotation, VectorAndMatrixRoundTrip, (std::uint32_t number)) {
   Stream stream = case_stream(number);
-  const Vec3 axis = test::unit_vector(stream);
+  const Vec3 axis = testing::unit_vector(stream);
   for (const double angle : {0.0, 1e-13, 1e-9, 1e-6, 1e-3, 0.5, 1.0, 2.0, 3.0, maths::kPi - 1e-3, maths::kPi - 1e-7,
                              maths::kPi - 1e-12, maths::kPi * stream.uniform()}) {
     const Mat3 m = rotation_matrix(axis * angle);
@@ -119,10 +119,10 @@ Columns integrate_columns(const Body& body, int side) {
 TEST(DishCut, VolumeAndCentroidEqualTheirQuadratureForTiltedEllipsoids) {
   for (std::uint32_t number = 1; number <= 40; ++number) {
     Stream stream = case_stream(number);
-    BodyGeometry g = test::any_ellipsoid(stream, 20.0);
-    const Body whole(g, test::smooth());
+    BodyGeometry g = testing::any_ellipsoid(stream, 20.0);
+    const Body whole(g, testing::smooth());
     g.centre_um.z() = stream.uniform({-0.8, 1.3}) * whole.half_width_um(Vec3::UnitZ());
-    const Body body(g, test::smooth());
+    const Body body(g, testing::smooth());
     const Columns exact = integrate_columns(body, 300);
     EXPECT_NEAR(volume_above_dish_um3(g) / exact.volume, 1.0, 2e-3) << "case " << number;
     EXPECT_LT((centroid_above_dish_um(g) - exact.moment / exact.volume).norm(), 0.02) << "case " << number;
@@ -130,8 +130,8 @@ TEST(DishCut, VolumeAndCentroidEqualTheirQuadratureForTiltedEllipsoids) {
 }
 
 TEST(DishCut, FullHalfAndEmptyBodiesAreExact) {
-  BodyGeometry g = test::sphere(5.0, Vec3(1.0, 2.0, 5.0));
-  const double full = test::ellipsoid_volume_um3(g.semiaxes_um);
+  BodyGeometry g = testing::sphere(5.0, Vec3(1.0, 2.0, 5.0));
+  const double full = testing::ellipsoid_volume_um3(g.semiaxes_um);
   EXPECT_DOUBLE_EQ(volume_above_dish_um3(g), full);
   EXPECT_EQ(centroid_above_dish_um(g), g.centre_um);
   g.centre_um.z() = 100.0;
@@ -145,13 +145,13 @@ TEST(DishCut, FullHalfAndEmptyBodiesAreExact) {
   // Spread on the dish, untilted: the centre at 0.55 C keeps (2 + 3d - d^3)/4 with d = 0.55.
   const Vec3 s(10.0, 8.0, 4.0);
   const BodyGeometry spread = {Vec3(0, 0, spread_height_um(s)), s, Vec3::Zero(), Vec3::Zero()};
-  EXPECT_NEAR(volume_above_dish_um3(spread) / test::ellipsoid_volume_um3(s), (2.0 + 3.0 * 0.55 - 0.55 * 0.55 * 0.55) / 4.0, 1e-14);
+  EXPECT_NEAR(volume_above_dish_um3(spread) / testing::ellipsoid_volume_um3(s), (2.0 + 3.0 * 0.55 - 0.55 * 0.55 * 0.55) / 4.0, 1e-14);
 }
 
 TEST(Footprint, IsTheVerticalProjectionOfTheSmoothEllipsoid) {
   for (std::uint32_t number = 1; number <= 200; ++number) {
     Stream stream = case_stream(number);
-    const Body body(test::any_ellipsoid(stream, 5.0), test::smooth());
+    const Body body(testing::any_ellipsoid(stream, 5.0), testing::smooth());
     const Vec2 half = body.footprint_half_extent_um();
     for (int i = 0; i < 100; ++i) {
       const double x = body.centre_um().x() + 1.2 * half.x() * stream.uniform({-1.0, 1.0});
@@ -171,11 +171,11 @@ TEST(Footprint, IsTheVerticalProjectionOfTheSmoothEllipsoid) {
 TEST(HalfWidth, IsTheFurthestPointAlongADirection) {
   for (std::uint32_t number = 1; number <= 50; ++number) {
     Stream stream = case_stream(number);
-    const Body body(test::any_ellipsoid(stream, 0.0), test::smooth());
-    const Vec3 unit = test::unit_vector(stream);
+    const Body body(testing::any_ellipsoid(stream, 0.0), testing::smooth());
+    const Vec3 unit = testing::unit_vector(stream);
     const Mat3 from_unit = body.to_unit().inverse();
     double furthest = 0.0;
-    for (int i = 0; i < 5000; ++i) furthest = std::max(furthest, unit.dot(from_unit * test::unit_vector(stream)));
+    for (int i = 0; i < 5000; ++i) furthest = std::max(furthest, unit.dot(from_unit * testing::unit_vector(stream)));
     EXPECT_LE(furthest, body.half_width_um(unit) * (1.0 + 1e-12)) << "case " << number;
     EXPECT_GE(furthest, body.half_width_um(unit) * 0.995) << "case " << number;
   }
@@ -184,7 +184,7 @@ TEST(HalfWidth, IsTheFurthestPointAlongADirection) {
 RC_GTEST_PROP(BodyBox, HoldsEveryPointOfTheNoisyBodyAboveTheDish, (std::uint32_t number)) {
   Stream stream = case_stream(number);
   const NoiseParams noise{stream.uniform({0.0, 0.40}), stream.uniform({2.0, 8.0}), stream.uniform({0.0, 6.28})};
-  const Body body(test::any_ellipsoid(stream, 5.0), noise);
+  const Body body(testing::any_ellipsoid(stream, 5.0), noise);
   const double reach = 1.5 * body.semiaxes_um().maxCoeff() * body.noisy_scale();
   for (int i = 0; i < 2000; ++i) {
     const Vec3 p = body.centre_um() + reach * Vec3(stream.uniform({-1, 1}), stream.uniform({-1, 1}), stream.uniform({-1, 1}));
@@ -197,23 +197,23 @@ RC_GTEST_PROP(BodyBox, HoldsEveryPointOfTheNoisyBodyAboveTheDish, (std::uint32_t
 
 RC_GTEST_PROP(Separated, NeverSeparatesBodiesThatShareAPoint, (std::uint32_t number)) {
   Stream stream = case_stream(number);
-  const Body a(test::any_ellipsoid(stream, 3.0), test::rough());
-  BodyGeometry other = test::any_ellipsoid(stream, 3.0);
-  const Vec3 direction = test::unit_vector(stream);
+  const Body a(testing::any_ellipsoid(stream, 3.0), testing::rough());
+  BodyGeometry other = testing::any_ellipsoid(stream, 3.0);
+  const Vec3 direction = testing::unit_vector(stream);
   const double gap = stream.uniform({0.7, 1.3}) * (a.noisy_scale() * a.half_width_um(direction) + 8.0);
   other.centre_um += gap * direction;
-  const Body b(other, test::rough());
+  const Body b(other, testing::rough());
   RC_CLASSIFY(separated(a, b), "separated");
   RC_ASSERT(separated(a, b) == separated(b, a));
-  if (separated(a, b)) RC_ASSERT(!touches(a, b, test::points(4096, number)));
+  if (separated(a, b)) RC_ASSERT(!touches(a, b, testing::points(4096, number)));
 }
 
 TEST(Body, RefusesWhatIsNotABody) {
   const double nan = std::nan("");
-  EXPECT_THROW(Body(test::sphere(0.0, Vec3::Zero()), test::smooth()), CheckFailure);
-  EXPECT_THROW(Body(test::sphere(-1.0, Vec3::Zero()), test::smooth()), CheckFailure);
-  EXPECT_THROW(Body(test::sphere(nan, Vec3::Zero()), test::smooth()), CheckFailure);
-  EXPECT_THROW(Body(test::sphere(5.0, Vec3(0.0, nan, 0.0)), test::smooth()), CheckFailure);
+  EXPECT_THROW(Body(testing::sphere(0.0, Vec3::Zero()), testing::smooth()), CheckFailure);
+  EXPECT_THROW(Body(testing::sphere(-1.0, Vec3::Zero()), testing::smooth()), CheckFailure);
+  EXPECT_THROW(Body(testing::sphere(nan, Vec3::Zero()), testing::smooth()), CheckFailure);
+  EXPECT_THROW(Body(testing::sphere(5.0, Vec3(0.0, nan, 0.0)), testing::smooth()), CheckFailure);
 }
 
 }  // namespace

@@ -21,26 +21,26 @@ namespace colony {
 namespace {
 
 // Grown once: 80 cells with some failed searches, and what was there at each event.
-const test::Run& grown() {
-  static const test::Run run = test::run(test::spec_of(5, 80));
+const testing::Run& grown() {
+  static const testing::Run run = testing::run(testing::spec_of(5, 80));
   return run;
 }
 
 TEST(Rules, GenerationLimitGivesAtMostTwoToTheLimitAndEndsAllSenescent) {
   for (std::int64_t limit = 1; limit <= 6; ++limit) {
     for (const bool inhibition : {false, true}) {
-      RunSpec spec = test::spec_of(static_cast<Seed>(limit), 1000);
+      RunSpec spec = testing::spec_of(static_cast<Seed>(limit), 1000);
       spec.params.division.generation_limit = limit;
       spec.params.division.inhibition = inhibition;
-      const test::Run run = test::run(spec);
+      const testing::Run run = testing::run(spec);
       const std::uint64_t most = std::uint64_t{1} << limit;
       if (!inhibition) {
-        EXPECT_EQ(run.colony().cells().size(), most) << test::name_of_run(spec);
+        EXPECT_EQ(run.colony().cells().size(), most) << testing::name_of_run(spec);
         EXPECT_EQ(run.finished().reason, FinishReason::kAllSenescent);
       }
-      EXPECT_LE(run.colony().cells().size(), most) << test::name_of_run(spec);
+      EXPECT_LE(run.colony().cells().size(), most) << testing::name_of_run(spec);
       const bool all = run.colony().count(Activity::kSenescent) == run.colony().cells().size();
-      EXPECT_EQ(run.finished().reason, all ? FinishReason::kAllSenescent : FinishReason::kExhausted) << test::name_of_run(spec);
+      EXPECT_EQ(run.finished().reason, all ? FinishReason::kAllSenescent : FinishReason::kExhausted) << testing::name_of_run(spec);
       for (const Cell& cell : run.colony().cells()) {
         EXPECT_LE(cell.generation, limit);
         EXPECT_EQ(cell.activity == Activity::kSenescent, cell.generation == limit && !cell.due_h);
@@ -50,9 +50,9 @@ TEST(Rules, GenerationLimitGivesAtMostTwoToTheLimitAndEndsAllSenescent) {
 }
 
 TEST(Rules, InhibitionOffAcceptsTheBestCandidateWhateverItsFitness) {
-  RunSpec spec = test::spec_of(2, 120);
+  RunSpec spec = testing::spec_of(2, 120);
   spec.params.division.inhibition = false;
-  const test::Run run = test::run(spec);
+  const testing::Run run = testing::run(spec);
   double least = 1.0;
   for (const Event& event : run.events) {
     EXPECT_NE(event.kind(), EventKind::kInhibited);
@@ -79,7 +79,7 @@ TEST(Rules, EveryDivisionKeepsTheConditionsOfTheModel) {
       EXPECT_EQ(own.generation, parent.generation + 1);
       EXPECT_EQ(daughter.generation, parent.generation + 1);
       EXPECT_EQ(daughter.ordinal, 0U);
-      const double v0 = test::ellipsoid_volume_um3(own.semiaxes_um), v1 = test::ellipsoid_volume_um3(daughter.semiaxes_um);
+      const double v0 = testing::ellipsoid_volume_um3(own.semiaxes_um), v1 = testing::ellipsoid_volume_um3(daughter.semiaxes_um);
       EXPECT_GE(v0, v1 * (1 - 1e-9));  // the larger share keeps the id
       EXPECT_GE(v1 / (v0 + v1), 0.40 - 1e-9);
       EXPECT_GE(v0 + v1, 800.0 - 1e-6);  // of the uncut ellipsoids
@@ -114,7 +114,7 @@ TEST(Rules, PairVolumesAndSharesOfManyDivisionsSpanTheirRanges) {
   for (const Event& event : grown().events) {
     const auto* divided = std::get_if<Divided>(&event.body);
     if (divided == nullptr) continue;
-    const double v = test::ellipsoid_volume_um3(divided->cells[0].semiaxes_um) + test::ellipsoid_volume_um3(divided->cells[1].semiaxes_um);
+    const double v = testing::ellipsoid_volume_um3(divided->cells[0].semiaxes_um) + testing::ellipsoid_volume_um3(divided->cells[1].semiaxes_um);
     least = std::min(least, v);
     most = std::max(most, v);
   }
@@ -133,7 +133,7 @@ TEST(Nucleus, SettlesInsideItsDeformedCellAtTheCentreOfMass) {
     if (settled == nullptr) continue;
     const CellId id = *event.cell_id;
     const Body& body = colony.body(id);
-    const std::vector<const Body*> near = test::neighbours_of(colony, id);
+    const std::vector<const Body*> near = testing::neighbours_of(colony, id);
     outside += deformed_field(body, near, spec.params.contact.rule, settled->nucleus_um) >= 0.0 ? 0 : 1;
     membrane_inside += deformed_field(body, near, spec.params.contact.rule, settled->nearest_membrane_um) >= 0.0 ? 1 : 0;
     // Midpoints of a regular lattice: nothing in common with the engine's points.
@@ -154,7 +154,7 @@ TEST(Nucleus, SettlesInsideItsDeformedCellAtTheCentreOfMass) {
   }
   ASSERT_GT(distances.size(), 100U);
   const double worst = *std::max_element(distances.begin(), distances.end());
-  const test::Mean mean = test::mean_of(distances), ratio = test::mean_of(volume_ratios);
+  const testing::Mean mean = testing::mean_of(distances), ratio = testing::mean_of(volume_ratios);
   std::printf("%zu settled nuclei: %d outside f~; distance from the lattice's centre of mass %.3f +- %.3f um, worst %.3f; volume ratio %.4f +- %.4f\n",
               distances.size(), outside, mean.value, mean.se, worst, ratio.value, ratio.se);
   EXPECT_EQ(membrane_inside, 0);
@@ -165,14 +165,14 @@ TEST(Nucleus, SettlesInsideItsDeformedCellAtTheCentreOfMass) {
 }
 
 TEST(Isolation, LoneCellsDivideInUniformDirections) {
-  RunSpec spec = test::spec_of(9, 100'000);
-  const int side = test::scaled(16, 40);
+  RunSpec spec = testing::spec_of(9, 100'000);
+  const int side = testing::scaled(16, 40);
   for (int i = 0; i < side; ++i) {
     for (int j = 0; j < side; ++j) spec.params.founders.positions_um.emplace_back(150.0 * i, 150.0 * j);
   }
   spec.params.division.generation_limit = 1;
   spec.params.search.turn_max_deg = 0.0;
-  const test::Run run = test::run(spec);
+  const testing::Run run = testing::run(spec);
   std::vector<double> bins(12, 0.0);
   for (const Event& event : run.events) {
     const auto* divided = std::get_if<Divided>(&event.body);
@@ -184,7 +184,7 @@ TEST(Isolation, LoneCellsDivideInUniformDirections) {
   }
   EXPECT_EQ(run.colony().cells().size(), static_cast<std::size_t>(2 * side * side));
   EXPECT_EQ(run.finished().reason, FinishReason::kAllSenescent);
-  EXPECT_LT(test::chi_square_uniform(bins), test::chi_square_bound(11)) << test::name_of_run(spec);
+  EXPECT_LT(testing::chi_square_uniform(bins), testing::chi_square_bound(11)) << testing::name_of_run(spec);
 }
 
 TEST(Direction, CellsInContactDivideAcrossTheLineFromNucleusToMembrane) {
@@ -198,8 +198,8 @@ TEST(Direction, CellsInContactDivideAcrossTheLineFromNucleusToMembrane) {
       EXPECT_NEAR(divided->plane_normal.norm(), 1.0, 1e-12);
       const Vec3 across = *parent.nearest_membrane_um - parent.nucleus_um;
       bool touching = false;
-      for (const Body* other : test::neighbours_of(before, parent.id)) {
-        touching = touching || touches(before.body(parent.id), *other, test::points(256, 1));
+      for (const Body* other : testing::neighbours_of(before, parent.id)) {
+        touching = touching || touches(before.body(parent.id), *other, testing::points(256, 1));
       }
       if (touching) {
         ++in_contact;
@@ -214,15 +214,15 @@ TEST(Direction, CellsInContactDivideAcrossTheLineFromNucleusToMembrane) {
 }
 
 TEST(Bounds, CellsAndTimeAreExact) {
-  const test::Run by_cells = test::run(test::spec_of(1, 37));
+  const testing::Run by_cells = testing::run(testing::spec_of(1, 37));
   EXPECT_EQ(by_cells.colony().cells().size(), 37U);
   EXPECT_EQ(by_cells.finished().reason, FinishReason::kCells);
   EXPECT_EQ(by_cells.finished().cell_count, 37U);
   EXPECT_EQ((by_cells.events.end() - 2)->kind(), EventKind::kDivided);  // ended by the very event that reached it
 
-  RunSpec timed = test::spec_of(1, 37);
+  RunSpec timed = testing::spec_of(1, 37);
   timed.until = {std::nullopt, 60.0};
-  const test::Run by_time = test::run(timed);
+  const testing::Run by_time = testing::run(timed);
   EXPECT_EQ(by_time.finished().reason, FinishReason::kTime);
   EXPECT_EQ(by_time.events.back().time_h, 60.0);
   for (const Event& event : by_time.events) EXPECT_LE(event.time_h, 60.0);
@@ -230,13 +230,13 @@ TEST(Bounds, CellsAndTimeAreExact) {
 
   RunSpec edge = timed;  // an event due exactly at the bound still happens
   edge.until.time_h = (by_time.events.end() - 2)->time_h;
-  EXPECT_EQ(test::run(edge).events.size(), by_time.events.size());
+  EXPECT_EQ(testing::run(edge).events.size(), by_time.events.size());
 
-  EXPECT_EQ(test::run(test::spec_of(1, 1)).events.size(), 2U);
+  EXPECT_EQ(testing::run(testing::spec_of(1, 1)).events.size(), 2U);
 }
 
 TEST(Bounds, HistoriesEndOnceAndFinishFromOutsideEndsThem) {
-  Simulator simulator(test::spec_of(1, 20));
+  Simulator simulator(testing::spec_of(1, 20));
   for (int k = 0; k < 10; ++k) ASSERT_TRUE(simulator.step());
   const Event event = simulator.finish(FinishReason::kCancelled);
   EXPECT_EQ(std::get<Finished>(event.body).reason, FinishReason::kCancelled);
@@ -247,11 +247,11 @@ TEST(Bounds, HistoriesEndOnceAndFinishFromOutsideEndsThem) {
 
 TEST(Exhaustion, EveryJobEndsInsideASmallDish) {
   for (const Seed seed : {1, 2, 3}) {
-    RunSpec spec = test::spec_of(seed, 100'000);
+    RunSpec spec = testing::spec_of(seed, 100'000);
     spec.params.dish.radius_um = 28.0;
     spec.params.division.generation_limit.reset();
-    const test::Run run = test::run(spec);
-    EXPECT_EQ(run.finished().reason, FinishReason::kExhausted) << test::name_of_run(spec);
+    const testing::Run run = testing::run(spec);
+    EXPECT_EQ(run.finished().reason, FinishReason::kExhausted) << testing::name_of_run(spec);
     EXPECT_GT(run.colony().count(Activity::kPassive), 0U);
     EXPECT_LT(run.colony().cells().size(), 60U);
     for (const Cell& cell : run.colony().cells()) {

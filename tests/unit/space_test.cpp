@@ -23,13 +23,13 @@ struct Scene {
 
 // Every second scene is of cells spread on the dish, the others of any ellipsoids; every third has a wall across it.
 void make_scene(std::uint32_t number, Scene& scene) {
-  Stream stream = test::case_stream(number);
-  const NoiseParams noise = number % 5 == 0 ? test::smooth() : number % 5 == 1 ? NoiseParams{0.45, 5.0, 6.0}
-                          : number % 5 == 2 ? NoiseParams{0.40, 8.0, 1.4} : test::rough();
+  Stream stream = testing::case_stream(number);
+  const NoiseParams noise = number % 5 == 0 ? testing::smooth() : number % 5 == 1 ? NoiseParams{0.45, 5.0, 6.0}
+                          : number % 5 == 2 ? NoiseParams{0.40, 8.0, 1.4} : testing::rough();
   const double x = stream.uniform({-500.0, 500.0}), y = stream.uniform({-500.0, 500.0});
   const auto any = [&](double spread) {
-    if (number % 2 == 0) return test::spread_cell(stream, x, y, spread);
-    BodyGeometry g = test::any_ellipsoid(stream, spread);
+    if (number % 2 == 0) return testing::spread_cell(stream, x, y, spread);
+    BodyGeometry g = testing::any_ellipsoid(stream, spread);
     g.centre_um += Vec3(x, y, 0.0);
     return g;
   };
@@ -47,11 +47,11 @@ TEST(CountOverlaps, EqualsItsBruteForceTwinOnRandomScenes) {
   OverlapScratch scratch;  // kept from scene to scene, as the search keeps it
   OverlapCounts fast;
   std::uint64_t shared = 0, beyond = 0;
-  const std::uint32_t scenes = test::scaled(3000U, 20'000U);
+  const std::uint32_t scenes = testing::scaled(3000U, 20'000U);
   for (std::uint32_t number = 1; number <= scenes; ++number) {
     Scene scene;
     make_scene(number, scene);
-    const PointSet points = test::points(number % 7 == 0 ? 1024 : number % 7 == 1 ? 64 : 256, number);
+    const PointSet points = testing::points(number % 7 == 0 ? 1024 : number % 7 == 1 ? 64 : 256, number);
     count_overlaps(scene.body, scene.near, scene.wall_um, points, scratch, fast);
     const OverlapCounts slow = count_overlaps_reference(scene.body, scene.near, scene.wall_um, points);
     ASSERT_EQ(fast.point_count, slow.point_count) << "scene " << number;
@@ -71,7 +71,7 @@ TEST(CountOverlaps, SinglePrecisionAgreesWithTheExactFieldButNearTheMembrane) {
   for (std::uint32_t number = 1; number <= 200; ++number) {
     Scene scene;
     make_scene(2 * number, scene);
-    const PointSet points = test::points(1024, number);
+    const PointSet points = testing::points(1024, number);
     OverlapCounts counts;
     count_overlaps(scene.body, scene.near, std::nullopt, points, scratch, counts);
     std::uint32_t exact = 0;
@@ -88,9 +88,9 @@ TEST(CountOverlaps, SinglePrecisionAgreesWithTheExactFieldButNearTheMembrane) {
 
 TEST(FloatNoise, AgreesWithGardnersSeriesWithin2e5) {
   for (std::uint32_t number = 1; number <= 100; ++number) {
-    Stream stream = test::case_stream(number);
+    Stream stream = testing::case_stream(number);
     const NoiseParams p{0.45, stream.uniform({2.0, 5.0}), stream.uniform({0.0, 6.28})};
-    BodyGeometry g = test::sphere(5.0, Vec3(0, 0, 5));
+    BodyGeometry g = testing::sphere(5.0, Vec3(0, 0, 5));
     for (int i = 0; i < 3; ++i) g.noise_offset[i] = noise_period(p) * stream.uniform();
     const Body body(g, p);
     const kernel::FloatBody prepared(body, body.centre_um());
@@ -107,12 +107,12 @@ TEST(Fitness, EqualsTheReferenceFormWithinStandardErrors) {
   // V_i and V_ij each on their own domain, as the paper computes them; the engine's ratio of integers on one set of points.
   std::vector<double> z;
   OverlapScratch scratch;
-  const PointSet fine = test::points(16'384, 7);
+  const PointSet fine = testing::points(16'384, 7);
   for (std::uint32_t number = 1; number <= 60; ++number) {
-    Stream stream = test::case_stream(number);
-    const Body body(test::spread_cell(stream, 0.0, 0.0, 0.0), test::rough());
+    Stream stream = testing::case_stream(number);
+    const Body body(testing::spread_cell(stream, 0.0, 0.0, 0.0), testing::rough());
     std::vector<Body> others;
-    for (int k = 0; k < 5; ++k) others.emplace_back(test::spread_cell(stream, 0.0, 0.0, 18.0), test::rough());
+    for (int k = 0; k < 5; ++k) others.emplace_back(testing::spread_cell(stream, 0.0, 0.0, 18.0), testing::rough());
     std::vector<const Body*> near;
     double taken = 0.0;
     for (const Body& other : others) {
@@ -121,7 +121,7 @@ TEST(Fitness, EqualsTheReferenceFormWithinStandardErrors) {
     }
     const double reference = std::max(0.0, 1.0 - taken / deformed_mass(body, {}, ContactRule::kSum, fine).volume_um3);
     OverlapCounts counts;
-    count_overlaps(body, near, std::nullopt, test::points(4096, number), scratch, counts);
+    count_overlaps(body, near, std::nullopt, testing::points(4096, number), scratch, counts);
     const double p = std::min(1.0, taken / deformed_mass(body, {}, ContactRule::kSum, fine).volume_um3);
     const double se = std::sqrt(std::max(p, 0.01) / counts.hit_count);  // of independent points: an upper bound for Sobol points
     EXPECT_NEAR(counts.fitness(), reference, 4.0 * se + 0.003) << "case " << number;
@@ -147,19 +147,19 @@ TEST(Fitness, IsClampedAndZeroForNothingAndAcrossTheWall) {
 }
 
 TEST(CountOverlaps, PointCountsThatAreNoPowerOfTwoInRangeFailACheck) {
-  const Body body(test::sphere(5.0, Vec3(0, 0, 10)), test::smooth());
+  const Body body(testing::sphere(5.0, Vec3(0, 0, 10)), testing::smooth());
   OverlapScratch scratch;
   OverlapCounts out;
-  PointSet points = test::points(64, 1);
+  PointSet points = testing::points(64, 1);
   points.x.resize(63);
   EXPECT_THROW(count_overlaps(body, {}, std::nullopt, points, scratch, out), CheckFailure);
-  EXPECT_THROW(count_overlaps(body, {}, std::nullopt, test::points(32, 1), scratch, out), CheckFailure);
+  EXPECT_THROW(count_overlaps(body, {}, std::nullopt, testing::points(32, 1), scratch, out), CheckFailure);
 }
 
 TEST(AdmissibleDomain, IsEmptyExactlyWhereAProjectionIsAndHoldsEveryCommonPoint) {
   for (std::uint32_t number = 1; number <= 500; ++number) {
-    Stream stream = test::case_stream(number);
-    const Body a(test::any_ellipsoid(stream, 15.0), test::rough()), b(test::any_ellipsoid(stream, 15.0), test::rough());
+    Stream stream = testing::case_stream(number);
+    const Body a(testing::any_ellipsoid(stream, 15.0), testing::rough()), b(testing::any_ellipsoid(stream, 15.0), testing::rough());
     const Box domain = admissible_domain(a, b);
     bool some = true;
     for (int i = 0; i < 3; ++i) some = some && std::max(a.box().low[i], b.box().low[i]) < std::min(a.box().high[i], b.box().high[i]);
@@ -174,11 +174,11 @@ TEST(AdmissibleDomain, IsEmptyExactlyWhereAProjectionIsAndHoldsEveryCommonPoint)
 
 TEST(Grid, FindsEveryBodyThatABruteForceSearchFinds) {
   for (std::uint32_t number = 1; number <= 30; ++number) {
-    Stream stream = test::case_stream(number);
+    Stream stream = testing::case_stream(number);
     Grid grid(30.0);
     std::vector<Body> bodies;
     for (std::uint32_t id = 1; id <= 120; ++id) {
-      bodies.emplace_back(test::spread_cell(stream, -40.0, 25.0, 150.0), test::rough());
+      bodies.emplace_back(testing::spread_cell(stream, -40.0, 25.0, 150.0), testing::rough());
       grid.put(CellId{id}, bodies.back().centre_um(), bodies.back().box());
     }
     for (std::uint32_t id = 3; id <= 120; id += 3) grid.remove(CellId{id}, bodies[id - 1].centre_um());
@@ -198,7 +198,7 @@ TEST(Grid, FindsEveryBodyThatABruteForceSearchFinds) {
     EXPECT_THROW(grid.remove(CellId{3}, bodies[2].centre_um()), CheckFailure);
   }
   Grid grid(5.0);
-  const Body large(test::sphere(6.0, Vec3(0, 0, 3)), test::smooth());
+  const Body large(testing::sphere(6.0, Vec3(0, 0, 3)), testing::smooth());
   EXPECT_THROW(grid.put(CellId{1}, large.centre_um(), large.box()), CheckFailure);
 }
 

@@ -23,13 +23,13 @@ double relative_rms(const std::vector<double>& errors) {
 }
 
 double ball_error_sobol(std::uint32_t n, std::uint32_t scramblings) {
-  const Body ball(test::sphere(kRadius_um, kHigh), test::smooth());
-  const double exact = test::ellipsoid_volume_um3(ball.semiaxes_um());
+  const Body ball(testing::sphere(kRadius_um, kHigh), testing::smooth());
+  const double exact = testing::ellipsoid_volume_um3(ball.semiaxes_um());
   OverlapScratch scratch;
   OverlapCounts counts;
   std::vector<double> errors;
   for (std::uint32_t k = 1; k <= scramblings; ++k) {
-    count_overlaps(ball, {}, std::nullopt, test::points(n, k), scratch, counts);
+    count_overlaps(ball, {}, std::nullopt, testing::points(n, k), scratch, counts);
     errors.push_back(ball.box().volume() * counts.hit_count / n / exact - 1.0);
   }
   return relative_rms(errors);
@@ -38,7 +38,7 @@ double ball_error_sobol(std::uint32_t n, std::uint32_t scramblings) {
 double ball_error_monte_carlo(std::uint32_t n, std::uint32_t repeats) {
   std::vector<double> errors;
   for (std::uint32_t k = 1; k <= repeats; ++k) {
-    Stream stream = test::case_stream(k);
+    Stream stream = testing::case_stream(k);
     std::uint32_t hits = 0;
     for (std::uint32_t i = 0; i < n; ++i) {
       const double x = stream.uniform({-1, 1}), y = stream.uniform({-1, 1}), z = stream.uniform({-1, 1});
@@ -52,7 +52,7 @@ double ball_error_monte_carlo(std::uint32_t n, std::uint32_t repeats) {
 TEST(BallVolume, ErrorFallsAsNToTheMinusTwoThirdsAgainstMinusOneHalf) {
   const std::vector<std::uint32_t> sizes = {64, 256, 1024, 4096};
   const std::vector<double> stated = {0.058, 0.034, 0.012, 0.0039};
-  const std::uint32_t repeats = test::scaled(400U, 4000U);
+  const std::uint32_t repeats = testing::scaled(400U, 4000U);
   std::vector<double> log_n, log_sobol, log_plain;
   for (std::size_t i = 0; i < sizes.size(); ++i) {
     const double sobol = ball_error_sobol(sizes[i], repeats), plain = ball_error_monte_carlo(sizes[i], repeats / 2);
@@ -63,7 +63,7 @@ TEST(BallVolume, ErrorFallsAsNToTheMinusTwoThirdsAgainstMinusOneHalf) {
     log_sobol.push_back(std::log(sobol));
     log_plain.push_back(std::log(plain));
   }
-  const test::Line sobol = test::fit_line(log_n, log_sobol), plain = test::fit_line(log_n, log_plain);
+  const testing::Line sobol = testing::fit_line(log_n, log_sobol), plain = testing::fit_line(log_n, log_plain);
   std::printf("slopes: Owen-Sobol %.3f, Monte Carlo %.3f\n", sobol.slope, plain.slope);
   EXPECT_NEAR(sobol.slope, -2.0 / 3.0, 0.06);
   EXPECT_NEAR(plain.slope, -0.5, 0.04);
@@ -73,41 +73,41 @@ TEST(LensVolume, EqualsTheFormulaByTheReferenceFormAndByTheRatioOfCounts) {
   OverlapScratch scratch;
   OverlapCounts counts;
   for (const double x : {0.0, 0.3, 0.7, 1.0, 1.4, 1.8}) {
-    const Body a(test::sphere(kRadius_um, kHigh), test::smooth());
-    const Body b(test::sphere(kRadius_um, kHigh + Vec3(0.0, x * kRadius_um, 0.0)), test::smooth());
+    const Body a(testing::sphere(kRadius_um, kHigh), testing::smooth());
+    const Body b(testing::sphere(kRadius_um, kHigh + Vec3(0.0, x * kRadius_um, 0.0)), testing::smooth());
     const double exact = (4.0 + x) * (2.0 - x) * (2.0 - x) / 16.0;
     const std::vector<const Body*> near = {&b};
     std::vector<double> by_domain, by_counts;
     for (std::uint32_t k = 1; k <= 40; ++k) {
-      const PointSet points = test::points(4096, k);
-      by_domain.push_back(interpenetration_volume_um3(a, b, points) / test::ellipsoid_volume_um3(a.semiaxes_um()));
+      const PointSet points = testing::points(4096, k);
+      by_domain.push_back(interpenetration_volume_um3(a, b, points) / testing::ellipsoid_volume_um3(a.semiaxes_um()));
       count_overlaps(a, near, std::nullopt, points, scratch, counts);
       by_counts.push_back(static_cast<double>(counts.shared_counts[0]) / counts.hit_count);
     }
-    const test::Mean domain = test::mean_of(by_domain), ratio = test::mean_of(by_counts);
+    const testing::Mean domain = testing::mean_of(by_domain), ratio = testing::mean_of(by_counts);
     std::printf("x %.1f  exact %.5f  domain %.5f +- %.5f  ratio %.5f +- %.5f\n", x, exact, domain.value, domain.se, ratio.value, ratio.se);
     EXPECT_NEAR(domain.value, exact, 5.0 * domain.se + 1e-6) << x;
     EXPECT_NEAR(ratio.value, exact, 5.0 * ratio.se + 1e-6) << x;
     EXPECT_LE(ratio.se, 0.001);
   }
-  const Body a(test::sphere(kRadius_um, kHigh), test::smooth());
-  const Body apart(test::sphere(kRadius_um, kHigh + Vec3(0.0, 2.0 * kRadius_um, 0.0)), test::smooth());
-  EXPECT_EQ(interpenetration_volume_um3(a, apart, test::points(4096, 1)), 0.0);
-  EXPECT_FALSE(touches(a, apart, test::points(4096, 1)));
+  const Body a(testing::sphere(kRadius_um, kHigh), testing::smooth());
+  const Body apart(testing::sphere(kRadius_um, kHigh + Vec3(0.0, 2.0 * kRadius_um, 0.0)), testing::smooth());
+  EXPECT_EQ(interpenetration_volume_um3(a, apart, testing::points(4096, 1)), 0.0);
+  EXPECT_FALSE(touches(a, apart, testing::points(4096, 1)));
 }
 
 TEST(DishCut, CountedVolumeOfACutEllipsoidIsTheAnalyticOne) {
   std::vector<double> ratios;
   for (std::uint32_t number = 1; number <= 100; ++number) {
-    Stream stream = test::case_stream(number);
-    const BodyGeometry g = test::spread_cell(stream, 0.0, 0.0, 0.0);
-    const Body body(g, test::smooth());
-    const MassEstimate mass = deformed_mass(body, {}, ContactRule::kSum, test::points(4096, number));
+    Stream stream = testing::case_stream(number);
+    const BodyGeometry g = testing::spread_cell(stream, 0.0, 0.0, 0.0);
+    const Body body(g, testing::smooth());
+    const MassEstimate mass = deformed_mass(body, {}, ContactRule::kSum, testing::points(4096, number));
     ratios.push_back(mass.volume_um3 / volume_above_dish_um3(g));
     EXPECT_NEAR(ratios.back(), 1.0, 0.025) << "case " << number;
     EXPECT_LT((mass.centre_um - centroid_above_dish_um(g)).norm(), 0.2) << "case " << number;
   }
-  const test::Mean mean = test::mean_of(ratios);
+  const testing::Mean mean = testing::mean_of(ratios);
   EXPECT_NEAR(mean.value, 1.0, 4.0 * mean.se);
 }
 

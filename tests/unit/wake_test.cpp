@@ -52,9 +52,9 @@ void check_woken(const RunSpec& spec, const Colony& before, const Colony& after,
 
 TEST(Waking, WakesExactlyTheSleepersNearAChangeThatGainedRoom) {
   for (const WakeRule rule : {WakeRule::kShare, WakeRule::kAlways}) {
-    RunSpec spec = test::spec_of(4, test::scaled(70, 200));
+    RunSpec spec = testing::spec_of(4, testing::scaled(70, 200));
     spec.params.wake.rule = rule;
-    const test::Run run = test::run(spec);
+    const testing::Run run = testing::run(spec);
     Colony before(spec.params), after(spec.params);
     int woken = 0;
     for (const Event& event : run.events) {
@@ -69,9 +69,9 @@ TEST(Waking, WakesExactlyTheSleepersNearAChangeThatGainedRoom) {
 
 TEST(Waking, AlwaysCostsManyMoreSearchesThanShare) {
   const auto searches_per_division = [](WakeRule rule) {
-    RunSpec spec = test::spec_of(6, 120);
+    RunSpec spec = testing::spec_of(6, 120);
     spec.params.wake.rule = rule;
-    const test::Run run = test::run(spec);
+    const testing::Run run = testing::run(spec);
     double searches = 0.0, divisions = 0.0;
     for (const Event& event : run.events) {
       searches += event.kind() == EventKind::kDivided || event.kind() == EventKind::kInhibited ? 1.0 : 0.0;
@@ -87,7 +87,7 @@ TEST(Waking, AlwaysCostsManyMoreSearchesThanShare) {
 
 TEST(Waking, ALuckyPlaceIsTriedAgainAtMostTriesMaxTimes) {
   // Nobody ever finds room: every founder has space around it but a fitness of 1 is out of reach.
-  RunSpec spec = test::spec_of(3, 100);
+  RunSpec spec = testing::spec_of(3, 100);
   spec.params.contact.fitness_min = 1.0;
   spec.params.contact.fitness_good = 1.0;
   spec.params.search.distance = {0.3, 0.3};  // the pair always overlaps itself
@@ -95,7 +95,7 @@ TEST(Waking, ALuckyPlaceIsTriedAgainAtMostTriesMaxTimes) {
   spec.params.search.corrector_generations = 0;
   for (const std::int64_t tries : {1, 3, 5}) {
     spec.params.wake.tries_max = tries;
-    const test::Run run = test::run(spec);
+    const testing::Run run = testing::run(spec);
     std::int64_t failed = 0;
     for (const Event& event : run.events) failed += event.kind() == EventKind::kInhibited ? 1 : 0;
     EXPECT_EQ(failed, tries + 1);  // the first search and tries_max repeats
@@ -104,7 +104,7 @@ TEST(Waking, ALuckyPlaceIsTriedAgainAtMostTriesMaxTimes) {
 }
 
 TEST(Founders, SeveralStandInTheDiscOutOfStepAndFreeEnough) {
-  RunSpec spec = test::spec_of(7, 1000);
+  RunSpec spec = testing::spec_of(7, 1000);
   spec.params.founders.count = 60;
   spec.params.founders.radius_um = 80.0;
   const Result<std::vector<Cell>> placed = place_founders(spec);
@@ -123,7 +123,7 @@ TEST(Founders, SeveralStandInTheDiscOutOfStepAndFreeEnough) {
     EXPECT_LE(*cell.due_h - cell.born_h, 18.0 + 1e-9);
     EXPECT_LE(*cell.settle_due_h, *cell.due_h);
     early += *cell.due_h < 6.0 ? 1.0 / 60.0 : 0.0;
-    const double v = test::ellipsoid_volume_um3(cell.semiaxes_um);
+    const double v = testing::ellipsoid_volume_um3(cell.semiaxes_um);
     EXPECT_GE(v, 400.0 - 1e-6);
     EXPECT_LE(v, 1800.0 + 1e-6);
     EXPECT_GE(cell.nucleus_radius_um, 2.5);
@@ -133,7 +133,7 @@ TEST(Founders, SeveralStandInTheDiscOutOfStepAndFreeEnough) {
     for (std::size_t k = 0; k + 1 < bodies.size(); ++k) earlier.push_back(&bodies[k]);
     OverlapScratch scratch;
     OverlapCounts counts;
-    count_overlaps(bodies.back(), earlier, std::nullopt, test::points(4096, 1), scratch, counts);
+    count_overlaps(bodies.back(), earlier, std::nullopt, testing::points(4096, 1), scratch, counts);
     EXPECT_GE(counts.fitness(), 0.75 - 0.02) << "founder " << cell.id.value;
   }
   EXPECT_NEAR(early, 0.5, 0.25);  // due times uniform over the first cycle
@@ -142,7 +142,7 @@ TEST(Founders, SeveralStandInTheDiscOutOfStepAndFreeEnough) {
 }
 
 TEST(Founders, OneStandsAtTheOriginAndWaitsAWholeCycle) {
-  const Result<std::vector<Cell>> placed = place_founders(test::spec_of(7, 10));
+  const Result<std::vector<Cell>> placed = place_founders(testing::spec_of(7, 10));
   ASSERT_TRUE(placed);
   EXPECT_EQ(placed->size(), 1U);
   EXPECT_EQ(placed->front().centre_um.head<2>(), Vec2(0, 0));
@@ -152,7 +152,7 @@ TEST(Founders, OneStandsAtTheOriginAndWaitsAWholeCycle) {
 }
 
 TEST(Founders, PositionsAreKeptAndErrorsPointAtEachWrongOne) {
-  RunSpec spec = test::spec_of(7, 10);
+  RunSpec spec = testing::spec_of(7, 10);
   spec.params.dish.radius_um = 100.0;
   spec.params.founders.positions_um = {Vec2(0, 0), Vec2(60, 0), Vec2(60.5, 0.5), Vec2(-50, -50), Vec2(0, 99), Vec2(300, 0)};
   const Result<std::vector<Cell>> placed = place_founders(spec);
@@ -169,7 +169,7 @@ TEST(Founders, PositionsAreKeptAndErrorsPointAtEachWrongOne) {
 }
 
 TEST(Founders, TooManyForTheirDiscAreAnErrorThatNamesTheFirstWithoutPlace) {
-  RunSpec spec = test::spec_of(7, 1000);
+  RunSpec spec = testing::spec_of(7, 1000);
   spec.params.founders.count = 200;
   spec.params.founders.radius_um = 20.0;
   const Result<std::vector<Cell>> placed = place_founders(spec);
@@ -181,7 +181,7 @@ TEST(Founders, TooManyForTheirDiscAreAnErrorThatNamesTheFirstWithoutPlace) {
 }
 
 TEST(Founders, InvalidParametersNeverReachTheSimulator) {
-  RunSpec spec = test::spec_of(1, 10);
+  RunSpec spec = testing::spec_of(1, 10);
   spec.params.noise.amplitude = 0.46;
   EXPECT_THROW(Simulator{spec}, CheckFailure);
 }
