@@ -22,7 +22,7 @@ struct PictureSpec {
   /// Exactly one of the two is used: um_per_px if > 0, else width_px.
   double um_per_px = 0.0;
   std::int64_t width_px = 1024;
-  bool scale_bar = true;
+  bool scale_bar = true;    // and the legend of the colours
 };
 
 inline constexpr std::int64_t kPictureSideMax_px = 8192;

@@ -5,6 +5,7 @@
 #include <functional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "server/http/message.hpp"
@@ -21,12 +22,17 @@ class Router {
  public:
   /// `pattern`: segments, "{}" captures one, e.g. "/v1/jobs/{}/events". HEAD is answered by the GET handler without its body.
   void add(std::string method, std::string pattern, Handler handler);
-  /// Finds and runs the handler. An exception becomes 500 "internal" with the request id, without details.
+  /// Who hears what a handler or a stream threw (any thread); the client gets the request id only.
+  void on_failure(std::function<void(const Request&, std::string_view what)> log) { failure_log_ = std::move(log); }
+  /// Finds and runs the handler. An exception becomes 500 "internal" with the request id, without details. The pattern is
+  /// chosen before the method, a literal segment before a capture. OPTIONS is answered with 204 and Allow.
   Response dispatch(Request& request) const;
+  void report_failure(const Request& request, std::string_view what) const;
 
  private:
   struct Route { std::string method; std::vector<std::string> segments; Handler handler; };
   std::vector<Route> routes_;
+  std::function<void(const Request&, std::string_view)> failure_log_;
 };
 
 }  // namespace colony::server::http

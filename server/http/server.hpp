@@ -18,16 +18,20 @@ struct ServerConfig {
   std::string address = "127.0.0.1";
   std::uint16_t port = 8080;                   // 0: any free port
   std::vector<std::string> allowed_hosts = {"127.0.0.1", "localhost", "[::1]"};   // without port
+  std::string base_path;                       // e.g. "/colony", taken off Request::path; empty: none
   std::size_t io_threads = 1;
   std::size_t worker_threads = 2;
   std::size_t connections_max = 2000;
   std::size_t requests_waiting_max = 256;      // for a worker; beyond: 503 with Retry-After
   std::size_t header_bytes_max = 8 * 1024;
+  std::size_t header_fields_max = 100;
+  std::size_t target_bytes_max = 4096;
   std::size_t body_bytes_max = 1024 * 1024;
   std::int64_t header_timeout_ms = 10'000;
   std::int64_t body_timeout_ms = 30'000;
   std::int64_t idle_timeout_ms = 60'000;
   std::int64_t write_timeout_ms = 30'000;      // without progress
+  std::int64_t stream_keep_alive_ms = 15'000;  // of a stream that waits
 };
 
 /// Called once per finished request, for the log (any thread).

@@ -1,0 +1,101 @@
+#include "engine/picture/top_view.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/base/check.hpp"
+#include "engine/picture/column.hpp"
+#include "engine/picture/pixels.hpp"
+
+namespace colony {
+namespace {
+
+/// Share of a pixel inside a disc, to first order in the distance of its centre from the rim.
+std::uint8_t disc_cover(double distance_um, double radius_um, double um_per_px) {
+  const double share = (radius_um - distance_um) / um_per_px + 0.5;
+  return static_cast<std::uint8_t>(std::clamp(share, 0.0, 1.0) * 255.0 + 0.5);
+}
+
+/// Indices of the pixel centres in [low, high], clipped to [begin, end).
+struct Span {
+  std::int64_t begin;
+  std::int64_t end;
+};
+Span centres_within(double low_px, double high_px, std::int64_t begin, std::int64_t end) {
+  const double low = std::clamp(low_px - 0.5, static_cast<double>(begin), static_cast<double>(end));
+  const double high = std::clamp(high_px - 0.5, static_cast<double>(begin) - 1.0, static_cast<double>(end) - 1.0);
+  return {ceil_to_int(low), floor_to_int(high) + 1};
+}
+
+void draw_body(TopView& view, CellId id, const Body& body) {
+  const Frame& frame = view.frame;
+  const Box& box = body.box();
+  const Span columns = centres_within((box.low.x() - frame.left_um) / frame.um_per_px,
+                                      (box.high.x() - frame.left_um) / frame.um_per_px, 0, frame.width_px);
+  const Span rows = centres_within((frame.top_um - box.high.y()) / frame.um_per_px,
+                                   (frame.top_um - box.low.y()) / frame.um_per_px, view.rows.first, view.rows.end);
+  const ColumnScan scan(body);
+  for (std::int64_t row = rows.begin; row < rows.end; ++row) {
+    const double y_um = frame.y_um(row);
+    for (std::int64_t column = columns.begin; column < columns.end; ++column) {
+      const std::size_t at = view.index(row, column);
+      // Ids come in ascending order and only a greater height replaces: a tie stays with the lower id.
+      const double floor_um = static_cast<double>(view.height_um[at]);
+      const float top_um = static_cast<float>(scan.top_um(frame.x_um(column), y_um, floor_um));
+      if (!(top_um > view.height_um[at])) continue;
+      view.height_um[at] = top_um;
+      view.owner[at] = id.value;
+    }
+  }
+}
+
+void draw_nucleus(TopView& view, const Cell& cell) {
+  const Frame& frame = view.frame;
+  const double reach_um = cell.nucleus_radius_um + frame.um_per_px;
+  const double x_px = (cell.nucleus_um.x() - frame.left_um) / frame.um_per_px;
+  const double y_px = (frame.top_um - cell.nucleus_um.y()) / frame.um_per_px;
+  const double reach_px = reach_um / frame.um_per_px;
+  const Span columns = centres_within(x_px - reach_px, x_px + reach_px, 0, frame.width_px);
+  const Span rows = centres_within(y_px - reach_px, y_px + reach_px, view.rows.first, view.rows.end);
+  for (std::int64_t row = rows.begin; row < rows.end; ++row) {
+    const double dy_um = frame.y_um(row) - cell.nucleus_um.y();
+    for (std::int64_t column = columns.begin; column < columns.end; ++column) {
+      const std::size_t at = view.index(row, column);
+      if (view.owner[at] != cell.id.value) continue;
+      const double dx_um = frame.x_um(column) - cell.nucleus_um.x();
+      view.nucleus[at] = disc_cover(std::sqrt(dx_um * dx_um + dy_um * dy_um), cell.nucleus_radius_um, frame.um_per_px);
+    }
+  }
+}
+
+}  // namespace
+
+TopView top_view(const Colony& colony, const Frame& frame, RowRange rows) {
+  CHECK(rows.first >= 0 && rows.first <= rows.end && rows.end <= frame.height_px);
+  CHECK(frame.width_px > 0 && frame.um_per_px > 0.0);
+  TopView view;
+  view.frame = frame;
+  view.rows = rows;
+  const std::size_t pixel_count = static_cast<std::size_t>((rows.end - rows.first) * frame.width_px);
+  view.owner.assign(pixel_count, 0);
+  view.height_um.assign(pixel_count, 0.0f);
+  view.nucleus.assign(pixel_count, 0);
+  if (pixel_count == 0) return view;
+
+  // All bodies are asked, not the grid: its columns are many more than the cells where few cells lie far apart.
+  const double top_um = frame.top_um - static_cast<double>(rows.first) * frame.um_per_px;
+  const double bottom_um = frame.top_um - static_cast<double>(rows.end) * frame.um_per_px;
+  const auto in_strip = [&](CellId id) {
+    const Box& box = colony.body(id).box();
+    return box.high.y() >= bottom_um && box.low.y() <= top_um;
+  };
+  for (const Cell& cell : colony.cells()) {
+    if (in_strip(cell.id)) draw_body(view, cell.id, colony.body(cell.id));
+  }
+  for (const Cell& cell : colony.cells()) {
+    if (in_strip(cell.id)) draw_nucleus(view, cell);
+  }
+  return view;
+}
+
+}  // namespace colony

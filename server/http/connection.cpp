@@ -1,0 +1,138 @@
+#include "server/http/connection.hpp"
+
+#include <boost/asio/buffer.hpp>
+
+namespace colony::server::http {
+namespace asio = boost::asio;
+using boost::system::error_code;
+namespace {
+
+constexpr std::size_t kReadAheadBytesMax = 8 * 1024;
+constexpr std::size_t kReadAheadStepBytes = 2 * 1024;
+constexpr std::int64_t kLingerMs = 2'000;
+constexpr std::size_t kLingerStepBytes = 64 * 1024;
+constexpr std::size_t kLingerBytesMax = 32 * 1024 * 1024;
+
+}  // namespace
+
+Connection::Connection(asio::ip::tcp::socket socket)
+    : socket_(std::move(socket)), deadline_(socket_.get_executor()), signal_(socket_.get_executor()) {
+  error_code ignored;  // a socket that died already fails at its first read
+  socket_.set_option(asio::ip::tcp::no_delay(true), ignored);
+  socket_.non_blocking(true, ignored);
+}
+
+void Connection::arm(std::int64_t timeout_ms) {
+  disarm();
+  deadline_.expires_after(std::chrono::milliseconds(timeout_ms));
+  deadline_.async_wait([self = shared_from_this(), generation = deadline_generation_](error_code error) {
+    if (error || generation != self->deadline_generation_) return;
+    self->deadline_has_passed_ = true;
+    error_code ignored;
+    self->socket_.cancel(ignored);
+  });
+}
+
+void Connection::disarm() {
+  ++deadline_generation_;
+  deadline_has_passed_ = false;
+  deadline_.cancel();
+}
+
+Awaitable<Connection::Io> Connection::read(std::size_t bytes_max) {
+  // The deadline may have passed while no operation was there to cancel.
+  if (deadline_has_passed_) co_return Io::kTimeout;
+  if (!socket_.is_open()) co_return Io::kClosed;
+  const std::size_t size_before = input_.size();
+  input_.resize(size_before + bytes_max);
+  const asio::mutable_buffer space(input_.data() + size_before, bytes_max);
+  const auto [error, count] = co_await socket_.async_read_some(space, kAwait);
+  input_.resize(size_before + count);
+  if (!error) co_return Io::kDone;
+  co_return deadline_has_passed_ ? Io::kTimeout : Io::kClosed;
+}
+
+Awaitable<Connection::Io> Connection::write(std::string_view bytes, std::int64_t timeout_ms) {
+  while (!bytes.empty()) {
+    if (!socket_.is_open()) co_return Io::kClosed;
+    arm(timeout_ms);
+    const asio::const_buffer rest(bytes.data(), bytes.size());
+    const auto [error, count] = co_await socket_.async_write_some(rest, kAwait);
+    bytes.remove_prefix(count);
+    if (error) co_return deadline_has_passed_ ? Io::kTimeout : Io::kClosed;
+  }
+  disarm();
+  co_return Io::kDone;
+}
+
+Awaitable<void> Connection::wait(Clock::time_point until) {
+  signal_.expires_at(until);
+  co_await signal_.async_wait(kAwait);
+}
+
+void Connection::notify() { signal_.cancel(); }
+
+void Connection::watch_peer() {
+  if (watching_ || peer_has_closed_ || !socket_.is_open() || input_.size() >= kReadAheadBytesMax) return;
+  watching_ = true;
+  socket_.async_wait(asio::ip::tcp::socket::wait_read,
+                     [self = shared_from_this(), generation = watch_generation_](error_code error) {
+                       if (generation != self->watch_generation_) return;
+                       self->watching_ = false;
+                       if (!error) self->look_at_peer();
+                     });
+}
+
+void Connection::unwatch_peer() {
+  ++watch_generation_;
+  if (!watching_) return;
+  watching_ = false;
+  error_code ignored;
+  socket_.cancel(ignored);
+}
+
+void Connection::look_at_peer() {
+  if (!socket_.is_open()) return;
+  char bytes[kReadAheadStepBytes];
+  error_code error;
+  const std::size_t count = socket_.read_some(asio::buffer(bytes), error);  // does not block
+  if (!error) {
+    input_.append(bytes, count);
+  } else if (error != asio::error::would_block && error != asio::error::try_again) {
+    peer_has_closed_ = true;
+    notify();
+  }
+  watch_peer();
+}
+
+Awaitable<void> Connection::linger() {
+  error_code error;
+  socket_.shutdown(asio::ip::tcp::socket::shutdown_send, error);
+  if (!error) {
+    arm(kLingerMs);
+    std::size_t total = 0;
+    while (total < kLingerBytesMax) {
+      input_.clear();
+      const Io io = co_await read(kLingerStepBytes);
+      if (io != Io::kDone) break;
+      total += input_.size();
+    }
+    disarm();
+  }
+  close();
+}
+
+void Connection::close() {
+  disarm();
+  error_code ignored;
+  socket_.close(ignored);
+  notify();
+}
+
+void Connection::abort() {
+  error_code ignored;
+  if (socket_.is_open()) socket_.set_option(asio::socket_base::linger(true, 0), ignored);
+  close();
+}
+
+}  // namespace colony::server::http

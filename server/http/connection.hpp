@@ -1,0 +1,81 @@
+// connection: one socket with deadlines: what a session needs of a socket, and nothing of HTTP.
+// Promises that every read and write ends: with bytes, at its deadline, or closed. A deadline leaves the socket open,
+//          so that the reason can still be told (Beast's tcp_stream would close it: no 408 could be sent).
+// Threads: everything runs on the strand of executor(). At most one of read, write, wait and linger is under way.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include <boost/asio/as_tuple.hpp>
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/use_awaitable.hpp>
+
+namespace colony::server::http {
+
+// GCC 12.2 destroys twice a temporary lambda with captures, or a temporary aggregate, that stands in a statement with
+// co_await. In every coroutine of this folder such values have a name on a line of their own.
+template <class T>
+using Awaitable = boost::asio::awaitable<T>;
+
+inline constexpr auto kAwait = boost::asio::as_tuple(boost::asio::use_awaitable);
+
+class Connection : public std::enable_shared_from_this<Connection> {
+ public:
+  enum class Io { kDone, kTimeout, kClosed };
+  using Clock = std::chrono::steady_clock;
+
+  explicit Connection(boost::asio::ip::tcp::socket socket);
+
+  boost::asio::any_io_executor executor() { return socket_.get_executor(); }
+  /// What was read and not yet used; pipelined requests stand here.
+  std::string& input() { return input_; }
+
+  /// One deadline for all reads until disarm or the next arm: a drip of single bytes does not prolong it.
+  void arm(std::int64_t timeout_ms);
+  void disarm();
+  /// Appends at most `bytes_max` to input().
+  Awaitable<Io> read(std::size_t bytes_max);
+  /// Sends all of `bytes`, which stay where they are until then; `timeout_ms` is for each step forward and replaces the
+  /// armed deadline.
+  Awaitable<Io> write(std::string_view bytes, std::int64_t timeout_ms);
+
+  /// Until notify() or `until`; may also return for no reason. Check, then wait: both happen on the strand, so that
+  /// nothing is lost between them.
+  Awaitable<void> wait(Clock::time_point until);
+  void notify();
+
+  /// While nothing is read or written: notify() when the peer closes. What it sends instead is kept in input(), up to a
+  /// bound; beyond that its closing is noticed at the next write.
+  void watch_peer();
+  void unwatch_peer();
+  bool peer_has_closed() const { return peer_has_closed_; }
+
+  /// Ends our side and reads until the peer ends its own, for a short time: a close with unread bytes would send a
+  /// reset, and that can reach the peer before it has read the answer.
+  Awaitable<void> linger();
+  void close();
+  /// Closes with a reset, so that a reader who waits for the end of the connection sees a failure and not an end.
+  void abort();
+
+ private:
+  void look_at_peer();
+
+  boost::asio::ip::tcp::socket socket_;
+  boost::asio::steady_timer deadline_;
+  boost::asio::steady_timer signal_;
+  std::string input_;
+  std::uint64_t deadline_generation_ = 0;  // a timer that fired for an older deadline means nothing
+  std::uint64_t watch_generation_ = 0;
+  bool deadline_has_passed_ = false;
+  bool watching_ = false;
+  bool peer_has_closed_ = false;
+};
+
+}  // namespace colony::server::http

@@ -1,0 +1,142 @@
+#include "server/http/router.hpp"
+
+#include <algorithm>
+#include <exception>
+
+#include "engine/base/check.hpp"
+#include "server/http/text.hpp"
+
+namespace colony::server::http {
+namespace {
+
+constexpr std::string_view kCapture = "{}";
+
+/// "/a/b" -> a, b; "/" -> nothing; "/a/" -> a and an empty segment, which no capture takes.
+std::vector<std::string> split(std::string_view path) {
+  std::vector<std::string> segments;
+  if (path.size() <= 1) return segments;
+  for (;;) {
+    path.remove_prefix(1);
+    segments.emplace_back(path.substr(0, path.find('/')));
+    path.remove_prefix(segments.back().size());
+    if (path.empty()) return segments;
+  }
+}
+
+bool matches(const std::vector<std::string>& pattern, const std::vector<std::string>& path) {
+  return std::equal(pattern.begin(), pattern.end(), path.begin(), path.end(),
+                    [](const auto& expected, const auto& segment) {
+                      return expected == kCapture ? !segment.empty() : expected == segment;
+                    });
+}
+
+/// Of two patterns that match the same path: the one whose first difference is a literal.
+bool is_more_specific(const std::vector<std::string>& a, const std::vector<std::string>& b) {
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    if (a[i] != b[i]) return b[i] == kCapture;
+  }
+  return false;
+}
+
+void append_json_string(std::string& out, std::string_view text) {
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  out += '"';
+  while (!text.empty()) {
+    const std::size_t length = utf8_length(text);
+    const char c = text.front();
+    if (length == 0) {
+      out += "\\ufffd";  // a stray byte, e.g. of a method that the gate refused
+    } else if (c == '"' || c == '\\') {
+      out.append("\\").append(1, c);
+    } else if (is_control(c)) {
+      out.append("\\u00").append(1, kDigits[static_cast<unsigned char>(c) / 16]).append(1, kDigits[c % 16]);
+    } else {
+      out.append(text.substr(0, length));
+    }
+    text.remove_prefix(std::max<std::size_t>(length, 1));
+  }
+  out += '"';
+}
+
+}  // namespace
+
+Response problem(int status, std::string_view code, std::string_view title, std::string_view detail,
+                 std::string_view request_id) {
+  Response response;
+  response.status = status;
+  response.headers.set("Content-Type", "application/problem+json");
+  std::string& out = response.body;
+  out = "{\"type\":";
+  append_json_string(out, "urn:colony:problem:" + std::string(code));
+  out += ",\"title\":";
+  append_json_string(out, title);
+  out += ",\"status\":" + std::to_string(status) + ",\"detail\":";
+  append_json_string(out, detail);
+  out += ",\"request_id\":";
+  append_json_string(out, request_id);
+  out += "}\n";
+  return response;
+}
+
+void Router::add(std::string method, std::string pattern, Handler handler) {
+  CHECK(!pattern.empty() && pattern.front() == '/');
+  auto segments = split(pattern);
+  for (const auto& route : routes_) CHECK(route.method != method || route.segments != segments);
+  routes_.push_back({std::move(method), std::move(segments), std::move(handler)});
+}
+
+void Router::report_failure(const Request& request, std::string_view what) const {
+  if (failure_log_) failure_log_(request, what);
+}
+
+Response Router::dispatch(Request& request) const {
+  const auto path = split(request.path);
+  // The pattern is chosen before the method: DELETE /v1/jobs/counts must not fall through to the job named "counts".
+  const std::vector<std::string>* pattern = nullptr;
+  for (const auto& route : routes_) {
+    if (matches(route.segments, path) && (!pattern || is_more_specific(route.segments, *pattern)))
+      pattern = &route.segments;
+  }
+  if (!pattern) {
+    return problem(404, "not-found", "There is nothing here", "no resource has the path " + request.path,
+                   request.request_id);
+  }
+
+  const Route* chosen = nullptr;
+  std::string allow;
+  for (const auto& route : routes_) {
+    if (route.segments != *pattern) continue;
+    const bool answers_head = route.method == "GET" && request.method == "HEAD" && !chosen;
+    if (route.method == request.method || answers_head) chosen = &route;
+    allow += (allow.empty() ? "" : ", ") + route.method + (route.method == "GET" ? ", HEAD" : "");
+  }
+  allow += ", OPTIONS";
+  if (!chosen) {
+    Response response;
+    if (request.method == "OPTIONS") {
+      response.status = 204;
+    } else {
+      response = problem(405, "method-not-allowed", "The method is not allowed here",
+                         request.path + " does not take " + request.method + ", but " + allow, request.request_id);
+    }
+    response.headers.set("Allow", allow);
+    return response;
+  }
+
+  request.path_params.clear();
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    if ((*pattern)[i] == kCapture) request.path_params.push_back(path[i]);
+  }
+  std::string what = "an exception that is not a std::exception";
+  try {
+    return chosen->handler(request);
+  } catch (const std::exception& error) {
+    what = error.what();
+  } catch (...) {
+  }
+  report_failure(request, what);
+  return problem(500, "internal", "The server made a mistake", "the server's log has more under this request_id",
+                 request.request_id);
+}
+
+}  // namespace colony::server::http

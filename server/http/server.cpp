@@ -1,0 +1,281 @@
+#include "server/http/server.hpp"
+
+#include <algorithm>
+#include <array>
+#include <condition_variable>
+#include <map>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/strand.hpp>
+
+#include "server/http/session.hpp"
+#include "server/http/text.hpp"
+
+namespace colony::server::http {
+namespace asio = boost::asio;
+using asio::ip::tcp;
+using boost::system::error_code;
+namespace {
+
+constexpr int kConnectionsInBacklogMax = 512;  // not yet accepted; the kernel holds them
+constexpr int kRefusedLingeringMax = 64;
+constexpr std::chrono::milliseconds kRefusedLinger{500};
+constexpr std::chrono::milliseconds kAcceptPause{100};
+
+Error config_error(std::string field, std::string message) {
+  Error error{ErrorCode::kInvalid, field + ": " + message};
+  error.fields.push_back({std::move(field), std::move(message)});
+  return error;
+}
+
+/// What would make a server that never answers, or a rule that never matches.
+Status check_config(const ServerConfig& config) {
+  const std::pair<const char*, std::size_t> counts[] = {
+      {"io_threads", config.io_threads},
+      {"worker_threads", config.worker_threads},
+      {"connections_max", config.connections_max},
+      {"requests_waiting_max", config.requests_waiting_max},
+      {"header_bytes_max", config.header_bytes_max},
+      {"header_fields_max", config.header_fields_max},
+      {"target_bytes_max", config.target_bytes_max},
+      {"header_timeout_ms", config.header_timeout_ms > 0},
+      {"body_timeout_ms", config.body_timeout_ms > 0},
+      {"idle_timeout_ms", config.idle_timeout_ms > 0},
+      {"write_timeout_ms", config.write_timeout_ms > 0},
+      {"stream_keep_alive_ms", config.stream_keep_alive_ms > 0},
+  };
+  for (const auto& [name, value] : counts) {
+    if (value == 0) return config_error(std::string("server.") + name, "must be greater than 0");
+  }
+  for (const auto& host : config.allowed_hosts) {
+    const auto authority = parse_authority(host);
+    if (!authority || authority->port)
+      return config_error("server.allowed_hosts", "'" + host + "' is not a host without port");
+  }
+  const std::string& base = config.base_path;
+  if (!base.empty() && (base.front() != '/' || base.back() == '/')) {
+    return config_error("server.base_path", "must begin with '/' and not end with one");
+  }
+  return Ok{};
+}
+
+std::string to_text(const tcp::endpoint& endpoint) {
+  return endpoint.address().to_string() + ":" + std::to_string(endpoint.port());
+}
+
+Error listen_error(std::string message) { return config_error("server.listen", std::move(message)); }
+
+// A connection beyond the limit: it gets its answer unread, without a session. It is kept for a moment, as a close with
+// unread bytes would take the answer away again.
+class RefusedConnection : public std::enable_shared_from_this<RefusedConnection> {
+ public:
+  RefusedConnection(tcp::socket socket, std::atomic<int>& count)
+      : socket_(std::move(socket)), timer_(socket_.get_executor()), count_(count) {
+    ++count_;
+  }
+  ~RefusedConnection() { --count_; }
+
+  void linger() {
+    timer_.expires_after(kRefusedLinger);
+    timer_.async_wait([self = shared_from_this()](error_code error) {
+      error_code ignored;
+      if (!error) self->socket_.close(ignored);
+    });
+    read();
+  }
+
+ private:
+  void read() {
+    socket_.async_read_some(asio::buffer(bytes_), [self = shared_from_this()](error_code error, std::size_t) {
+      if (error) {
+        self->timer_.cancel();
+      } else {
+        self->read();
+      }
+    });
+  }
+
+  tcp::socket socket_;
+  asio::steady_timer timer_;
+  std::atomic<int>& count_;
+  std::array<char, 1024> bytes_;
+};
+
+class BeastServer final : public Server {
+ public:
+  BeastServer(ServerConfig config, const Router& router, std::function<void(const AccessRecord&)> log)
+      : config_(std::move(config)),
+        workers_(config_.worker_threads, config_.requests_waiting_max),
+        shared_{
+            config_, policy_, router, workers_, request_ids_, std::move(log), [this](std::uint64_t id) { on_end(id); }},
+        acceptor_(asio::make_strand(io_)),
+        pause_(acceptor_.get_executor()),
+        work_(asio::make_work_guard(io_)) {}
+
+  ~BeastServer() override { BeastServer::stop(0); }
+
+  Status listen() {
+    error_code error;
+    const auto address = asio::ip::make_address(config_.address, error);
+    if (error) return listen_error("'" + config_.address + "' is not an IP address");
+    if (!address.is_loopback()) {
+      return listen_error("'" + config_.address +
+                          "' is not a loopback address (127.0.0.0/8 or ::1); this version has no tokens and "
+                          "no TLS, so it serves this machine only");
+    }
+    const tcp::endpoint endpoint(address, config_.port);
+    acceptor_.open(endpoint.protocol(), error);
+    // Without it a restarted server waits for the connections of the one before it.
+    if (!error) acceptor_.set_option(asio::socket_base::reuse_address(true), error);
+    if (!error) acceptor_.bind(endpoint, error);
+    if (!error) acceptor_.listen(kConnectionsInBacklogMax, error);
+    if (error) return listen_error("cannot listen on " + to_text(endpoint) + ": " + error.message());
+    policy_.port = acceptor_.local_endpoint().port();
+    for (const auto& host : config_.allowed_hosts) {
+      std::string lower(host.size(), '\0');
+      std::transform(host.begin(), host.end(), lower.begin(), to_lower);
+      policy_.allowed_hosts.push_back(std::move(lower));
+    }
+    policy_.header_bytes_max = config_.header_bytes_max;
+    policy_.header_fields_max = config_.header_fields_max;
+    policy_.target_bytes_max = config_.target_bytes_max;
+    policy_.body_bytes_max = config_.body_bytes_max;
+    return Ok{};
+  }
+
+  std::uint16_t port() const override { return policy_.port; }
+
+  void run() override {
+    workers_.start();
+    accept();
+    for (std::size_t i = 0; i < config_.io_threads; ++i) threads_.emplace_back([this] { io_.run(); });
+  }
+
+  void stop(std::int64_t grace_ms) override {
+    const std::lock_guard once(stop_mutex_);
+    if (stopped_) return;
+    stopped_ = true;
+    asio::post(acceptor_.get_executor(), [this] {
+      error_code ignored;
+      acceptor_.close(ignored);
+      pause_.cancel();
+    });
+    {
+      std::unique_lock lock(mutex_);
+      draining_ = true;
+      for (const auto& [id, session] : sessions_) session->drain();
+      ended_.wait_for(lock, std::chrono::milliseconds(grace_ms), [this] { return sessions_.empty(); });
+      for (const auto& [id, session] : sessions_) session->close();
+      // What still keeps a session now is a handler or a pull that runs.
+      ended_.wait(lock, [this] { return sessions_.empty(); });
+    }
+    workers_.stop();
+    work_.reset();
+    io_.stop();
+    for (auto& thread : threads_) thread.join();
+  }
+
+ private:
+  void accept() {
+    acceptor_.async_accept(asio::make_strand(io_), [this](error_code error, tcp::socket socket) {
+      if (!acceptor_.is_open()) return;
+      if (!error) {
+        on_connection(std::move(socket));
+      } else if (error != asio::error::connection_aborted) {
+        // Out of descriptors or memory: at once again would only burn the time of those who could give some back.
+        pause_.expires_after(kAcceptPause);
+        pause_.async_wait([this](error_code) {
+          if (acceptor_.is_open()) accept();
+        });
+        return;
+      }
+      accept();
+    });
+  }
+
+  void on_connection(tcp::socket socket) {
+    error_code error;
+    const auto remote = socket.remote_endpoint(error);
+    if (error) return;  // gone already
+    std::shared_ptr<Session> session;
+    {
+      const std::lock_guard lock(mutex_);
+      if (draining_) return;
+      if (sessions_.size() < config_.connections_max) {
+        const std::uint64_t id = ++session_count_;
+        session = std::make_shared<Session>(std::move(socket), shared_, id, to_text(remote));
+        sessions_.emplace(id, session);
+      }
+    }
+    if (session) {
+      session->start();
+    } else {
+      refuse(std::move(socket));
+    }
+  }
+
+  void refuse(tcp::socket socket) {
+    const std::string id = request_ids_.next();
+    Response response =
+        problem(503, "too-many-connections", "The server has too many connections", "try again in a second", id);
+    response.headers.set("Retry-After", "1");
+    WireOptions options;
+    options.keep_alive = false;
+    options.request_id = id;
+    const std::string bytes = write_head(response, options) + response.body;
+    error_code error;
+    socket.non_blocking(true, error);
+    // One write without waiting: the buffer of a new socket takes it whole.
+    if (!error) socket.write_some(asio::buffer(bytes), error);
+    if (!error) socket.shutdown(tcp::socket::shutdown_send, error);
+    if (!error && refused_count_ < kRefusedLingeringMax) {
+      std::make_shared<RefusedConnection>(std::move(socket), refused_count_)->linger();
+    }
+  }
+
+  void on_end(std::uint64_t id) {
+    const std::lock_guard lock(mutex_);
+    sessions_.erase(id);
+    ended_.notify_all();
+  }
+
+  const ServerConfig config_;  // fixed after construction, as is all down to shared_ (policy_: after listen)
+  GatePolicy policy_;
+  std::atomic<int> refused_count_{0};
+  RequestIds request_ids_;  // synchronises itself, as the two below
+  asio::io_context io_;
+  WorkerPool workers_;
+  SessionShared shared_;
+
+  tcp::acceptor acceptor_;  // on its own strand, with pause_
+  asio::steady_timer pause_;
+  asio::executor_work_guard<asio::io_context::executor_type> work_;
+  std::vector<std::thread> threads_;  // run and stop
+
+  std::mutex stop_mutex_;  // guards stopped_
+  bool stopped_ = false;
+  std::mutex mutex_;  // guards everything below
+  std::condition_variable ended_;
+  bool draining_ = false;
+  std::uint64_t session_count_ = 0;
+  std::map<std::uint64_t, std::shared_ptr<Session>> sessions_;  // at most config_.connections_max
+};
+
+}  // namespace
+
+Result<std::unique_ptr<Server>> Server::create(ServerConfig config, const Router& router,
+                                               std::function<void(const AccessRecord&)> log) {
+  if (const auto status = check_config(config); !status) return status.error();
+  auto server = std::make_unique<BeastServer>(std::move(config), router, std::move(log));
+  const auto status = server->listen();
+  if (!status) return status.error();
+  return std::unique_ptr<Server>(std::move(server));
+}
+
+}  // namespace colony::server::http

@@ -1,0 +1,294 @@
+#include "server/http/session.hpp"
+
+#include <random>
+#include <utility>
+
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
+#include <boost/asio/post.hpp>
+
+#include "server/http/body_reader.hpp"
+
+namespace colony::server::http {
+namespace asio = boost::asio;
+namespace {
+
+using Io = Connection::Io;
+
+constexpr std::size_t kHeadReadBytes = 4 * 1024;
+constexpr std::size_t kBodyReadBytes = 64 * 1024;
+constexpr std::size_t kIdleInputBytesMax = 16 * 1024;   // an idle connection keeps no larger buffer
+constexpr std::size_t kJoinedBodyBytesMax = 32 * 1024;  // up to here head and body are sent in one write
+
+std::uint64_t random_64() {
+  std::random_device device;
+  return (static_cast<std::uint64_t>(device()) << 32) | device();
+}
+
+// The finaliser of splitmix64: a bijection, so that different counts give different ids.
+std::uint64_t mix(std::uint64_t value) {
+  value = (value ^ (value >> 30)) * 0xbf58476d1ce4e5b9u;
+  value = (value ^ (value >> 27)) * 0x94d049bb133111ebu;
+  return value ^ (value >> 31);
+}
+
+void append_hex(std::string& out, std::uint64_t value) {
+  for (int shift = 60; shift >= 0; shift -= 4) out += "0123456789abcdef"[(value >> shift) & 0xf];
+}
+
+Refusal timed_out(std::string_view what, std::int64_t timeout_ms) {
+  return {408, "request-timeout", "The request took too long",
+          "the " + std::string(what) + " must be complete within " + std::to_string(timeout_ms) + " ms"};
+}
+
+}  // namespace
+
+RequestIds::RequestIds() : seed_high_(random_64()), seed_low_(random_64()) {}
+
+std::string RequestIds::next() {
+  const std::uint64_t count = ++count_;
+  std::string id;
+  append_hex(id, mix(seed_high_ ^ count));
+  append_hex(id, mix(seed_low_ + count));
+  return id;
+}
+
+Session::Session(asio::ip::tcp::socket socket, SessionShared& shared, std::uint64_t id, std::string remote)
+    : connection_(std::make_shared<Connection>(std::move(socket))),
+      shared_(shared),
+      id_(id),
+      remote_(std::move(remote)) {}
+
+void Session::start() { asio::co_spawn(connection_->executor(), run(shared_from_this()), asio::detached); }
+
+void Session::on_strand(std::function<void()> task) { asio::post(connection_->executor(), std::move(task)); }
+
+void Session::drain() {
+  on_strand([self = shared_from_this()] {
+    self->draining_ = true;
+    // A request whose header is incomplete has not begun: its sender may safely repeat it elsewhere.
+    if (self->phase_ != Phase::kAnswering) self->connection_->close();
+    self->connection_->notify();
+  });
+}
+
+void Session::close() {
+  closing_ = true;
+  on_strand([self = shared_from_this()] { self->connection_->close(); });
+}
+
+Awaitable<void> Session::run(std::shared_ptr<Session> self) {
+  try {
+    bool goes_on = true;
+    while (goes_on) goes_on = co_await self->serve_one();
+  } catch (const std::exception& error) {
+    // Only a lack of memory can come here; the connection ends, the server goes on.
+    self->shared_.router.report_failure(self->request_, error.what());
+  }
+  self->let_go_of_stream();
+  self->connection_->close();
+  self->shared_.on_end(self->id_);
+}
+
+Awaitable<bool> Session::serve_one() {
+  head_ = RequestHead();
+  request_ = Request();
+  response_ = Response();
+  refusal_.reset();
+  sent_bytes_ = 0;
+  bool goes_on = co_await read_head();
+  if (!goes_on) co_return false;
+  served_before_ = true;
+  if (!refusal_) refusal_ = admit();
+  if (!refusal_) {
+    goes_on = co_await read_body();
+    if (!goes_on) co_return false;
+  }
+  if (head_.request_id.empty()) head_.request_id = shared_.request_ids.next();
+  const bool is_routed = !refusal_ && fill_request();
+  if (is_routed) co_await handle();
+  co_return co_await answer();
+}
+
+Awaitable<bool> Session::read_head() {
+  phase_ = Phase::kReadingHead;
+  std::string& input = connection_->input();
+  if (input.empty() && input.capacity() > kIdleInputBytesMax) input.shrink_to_fit();
+  HeadScanner scanner;
+  bool has_begun = false;
+  bool has_skipped_line = false;
+  connection_->arm(served_before_ ? shared_.config.idle_timeout_ms : shared_.config.header_timeout_ms);
+  for (;;) {
+    if (draining_) co_return false;
+    if (!has_begun) {
+      // One empty line before a request is let pass (RFC 9112, 2.2): old clients end a body with it.
+      if (!has_skipped_line && input.compare(0, 2, "\r\n") == 0) {
+        input.erase(0, 2);
+        has_skipped_line = true;
+      }
+      if (!input.empty() && input != "\r") {
+        has_begun = true;
+        begin_ = Connection::Clock::now();
+        connection_->arm(shared_.config.header_timeout_ms);
+      }
+    }
+    if (has_begun) {
+      const auto state = scanner.scan(input, shared_.policy);
+      if (state == HeadScanner::State::kRefused) refusal_ = scanner.refusal();
+      if (state == HeadScanner::State::kComplete) {
+        refusal_ = examine(std::string_view(input).substr(0, scanner.head_size()), shared_.policy, head_);
+        input.erase(0, scanner.head_size());
+      }
+      if (state != HeadScanner::State::kNeedMore) break;
+    }
+    const Io io = co_await connection_->read(kHeadReadBytes);
+    if (io == Io::kDone) continue;
+    if (io == Io::kClosed || !has_begun) co_return false;
+    refusal_ = timed_out("header", shared_.config.header_timeout_ms);
+    break;
+  }
+  connection_->disarm();
+  phase_ = Phase::kAnswering;
+  co_return true;
+}
+
+// Here tokens will be checked: after the gate, so that only well-formed requests are looked at, and before the body is
+// read, so that a stranger cannot make the server hold one. In this version only loopback addresses are bound and every
+// local user is admitted.
+std::optional<Refusal> Session::admit() const { return std::nullopt; }
+
+Awaitable<bool> Session::read_body() {
+  std::string& input = connection_->input();
+  if (head_.expects_continue && input.empty()) {
+    const Io io = co_await connection_->write(kContinue, shared_.config.write_timeout_ms);
+    if (io != Io::kDone) co_return false;
+  }
+  BodyReader reader(head_, shared_.config.body_bytes_max);
+  connection_->arm(shared_.config.body_timeout_ms);
+  for (;;) {
+    const auto state = reader.feed(input);
+    if (state == BodyReader::State::kRefused) refusal_ = reader.refusal();
+    if (state == BodyReader::State::kComplete) request_.body = reader.take_body();
+    if (state != BodyReader::State::kNeedMore) break;
+    const Io io = co_await connection_->read(kBodyReadBytes);
+    if (io == Io::kDone) continue;
+    if (io == Io::kClosed) co_return false;
+    refusal_ = timed_out("body", shared_.config.body_timeout_ms);
+    break;
+  }
+  connection_->disarm();
+  co_return true;
+}
+
+// False: outside base_path; the response is there already.
+bool Session::fill_request() {
+  request_.method = head_.method;
+  request_.path = head_.target.path;
+  request_.query = head_.target.query;
+  request_.headers = head_.headers;
+  request_.request_id = head_.request_id;
+  const std::string& base = shared_.config.base_path;
+  if (base.empty()) return true;
+  const bool is_inside = request_.path.compare(0, base.size(), base) == 0 &&
+                         (request_.path.size() == base.size() || request_.path[base.size()] == '/');
+  if (!is_inside) {
+    response_ = problem(404, "not-found", "There is nothing here", "no resource has the path " + request_.path,
+                        request_.request_id);
+    return false;
+  }
+  request_.path.erase(0, base.size());
+  if (request_.path.empty()) request_.path = "/";
+  return true;
+}
+
+WorkerPool::Task Session::as_worker_task(std::function<void()> work) {
+  worker_is_done_ = false;
+  return [self = shared_from_this(), work = std::move(work)] {
+    if (!self->closing_) work();
+    self->on_strand([self] {
+      self->worker_is_done_ = true;
+      self->connection_->notify();
+    });
+  };
+}
+
+// Also a closed session waits: the worker still uses request_, response_ or piece_.
+Awaitable<void> Session::wait_for_worker() {
+  while (!worker_is_done_) co_await connection_->wait(Connection::Clock::time_point::max());
+}
+
+Awaitable<void> Session::handle() {
+  auto task = as_worker_task([this] { response_ = shared_.router.dispatch(request_); });
+  const bool is_queued = shared_.workers.submit_request(std::move(task));
+  if (is_queued) {
+    co_await wait_for_worker();
+  } else {
+    refusal_ =
+        Refusal{503, "overloaded", "The server is busy", "too many requests wait already; try again in a second"};
+  }
+}
+
+void Session::prepare_response() {
+  if (refusal_) {
+    response_ = problem(refusal_->status, refusal_->code, refusal_->title, refusal_->detail, head_.request_id);
+    if (refusal_->status == 503) response_.headers.set("Retry-After", "1");
+  } else if (const auto fault = fault_of(response_)) {
+    let_go_of_stream();
+    shared_.router.report_failure(request_, *fault);
+    response_ = problem(500, "internal", "The server made a mistake", "the server's log has more under this request_id",
+                        head_.request_id);
+  }
+  keep_alive_ = head_.keep_alive && !refusal_ && !draining_;
+}
+
+Awaitable<bool> Session::answer() {
+  if (closing_) co_return false;
+  prepare_response();
+  WireOptions options;
+  options.version_minor = head_.version_minor;
+  options.request_id = head_.request_id;
+  if (response_.stream) options.framing = head_.version_minor == 0 ? Framing::kUntilClose : Framing::kChunked;
+  if (options.framing == Framing::kUntilClose) keep_alive_ = false;
+  options.keep_alive = keep_alive_;
+  const std::string head = write_head(response_, options);
+  bool is_sent = co_await send_plain(head);
+  if (is_sent && response_.stream && head_.method != "HEAD") {
+    is_sent = co_await send_stream(options.framing);
+    connection_->unwatch_peer();
+  }
+  let_go_of_stream();
+  write_log();
+  if (!is_sent) co_return false;
+  if (keep_alive_) co_return true;
+  phase_ = Phase::kLingering;
+  if (!draining_) co_await connection_->linger();
+  co_return false;
+}
+
+Awaitable<bool> Session::send_plain(const std::string& head) {
+  const bool with_body = head_.method != "HEAD" && !response_.stream;
+  const bool is_joined = with_body && response_.body.size() <= kJoinedBodyBytesMax;
+  const std::string first = is_joined ? head + response_.body : head;
+  Io io = co_await connection_->write(first, shared_.config.write_timeout_ms);
+  if (io == Io::kDone && with_body && !is_joined) {
+    io = co_await connection_->write(response_.body, shared_.config.write_timeout_ms);
+  }
+  if (io == Io::kDone && with_body) sent_bytes_ = response_.body.size();
+  co_return io == Io::kDone;
+}
+
+void Session::write_log() const {
+  if (!shared_.log) return;
+  AccessRecord record;
+  record.method = head_.method;
+  record.path = head_.target.path;
+  record.request_id = head_.request_id;
+  record.remote = remote_;
+  record.status = response_.status;
+  record.body_bytes = sent_bytes_;
+  const auto duration = Connection::Clock::now() - begin_;
+  record.duration_us = std::chrono::duration_cast<std::chrono::microseconds>(duration).count();
+  shared_.log(record);
+}
+
+}  // namespace colony::server::http

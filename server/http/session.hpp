@@ -1,0 +1,110 @@
+// session: the requests of one connection, one after the other: gate, admission, body, router, answer.
+// Promises that nothing of a handler or a stream runs on an I/O thread; that every request is answered in order, or the
+//          connection is closed; that a stream holds a worker only while it is pulled, and is never pulled while its
+//          last piece is still being sent; and that it ends soon after close().
+// Does not keep a connection after a refusal: where the next request begins is then a matter of trust.
+// Threads: start, drain and close from any thread; everything else on the connection's strand, but for the tasks of
+//          workers, which touch request_, response_ and piece_ while the session waits for them.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "server/http/connection.hpp"
+#include "server/http/gate.hpp"
+#include "server/http/router.hpp"
+#include "server/http/server.hpp"
+#include "server/http/wire.hpp"
+#include "server/http/worker_pool.hpp"
+
+namespace colony::server::http {
+
+/// Random and never the same twice in a server: 32 hexadecimal digits.
+class RequestIds {
+ public:
+  RequestIds();
+  std::string next();
+
+ private:
+  const std::uint64_t seed_high_;
+  const std::uint64_t seed_low_;
+  std::atomic<std::uint64_t> count_{0};
+};
+
+/// What the sessions of a server share; it outlives them.
+struct SessionShared {
+  const ServerConfig& config;
+  const GatePolicy& policy;
+  const Router& router;
+  WorkerPool& workers;
+  RequestIds& request_ids;
+  std::function<void(const AccessRecord&)> log;  // may be empty
+  std::function<void(std::uint64_t session_id)> on_end;
+};
+
+class Session : public std::enable_shared_from_this<Session> {
+ public:
+  Session(boost::asio::ip::tcp::socket socket, SessionShared& shared, std::uint64_t id, std::string remote);
+
+  void start();
+  /// Ends at once if no request is under way; else after its answer, a stream after its farewell.
+  void drain();
+  void close();
+
+ private:
+  enum class Phase { kReadingHead, kAnswering, kLingering };
+  class Waker;
+
+  static Awaitable<void> run(std::shared_ptr<Session> self);
+  Awaitable<bool> serve_one();  // false: the connection is over
+  Awaitable<bool> read_head();  // false: nothing is left to answer, here and below
+  Awaitable<bool> read_body();
+  Awaitable<void> handle();
+  Awaitable<bool> answer();
+  Awaitable<bool> send_plain(const std::string& head);
+  Awaitable<bool> send_stream(Framing framing);
+  Awaitable<bool> send_piece(Framing framing, std::string_view piece);
+  Awaitable<void> wait_for_stream(std::string_view farewell);
+  Awaitable<void> wait_for_worker();
+
+  std::optional<Refusal> admit() const;
+  bool fill_request();
+  WorkerPool::Task as_worker_task(std::function<void()> work);
+  void prepare_response();
+  void pull_stream(bool is_first);
+  void let_go_of_stream();
+  void write_log() const;
+  void on_strand(std::function<void()> task);
+
+  const std::shared_ptr<Connection> connection_;
+  SessionShared& shared_;
+  const std::uint64_t id_;
+  const std::string remote_;
+  std::atomic<bool> closing_{false};  // read by workers, to skip what nobody waits for
+  bool draining_ = false;
+  Phase phase_ = Phase::kReadingHead;
+  bool served_before_ = false;
+
+  // The request under way.
+  Connection::Clock::time_point begin_;
+  RequestHead head_;
+  std::optional<Refusal> refusal_;
+  Request request_;
+  Response response_;
+  bool keep_alive_ = false;
+  std::uint64_t sent_bytes_ = 0;  // of the body
+
+  bool worker_is_done_ = false;
+  std::shared_ptr<Waker> waker_;
+  bool woken_ = false;
+  std::string piece_;
+  std::optional<BodySource::Pull> pulled_;  // empty: the pull threw
+};
+
+}  // namespace colony::server::http

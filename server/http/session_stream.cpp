@@ -1,0 +1,132 @@
+// The half of a session that sends a BodySource.
+#include <exception>
+#include <utility>
+
+#include "server/http/session.hpp"
+
+namespace colony::server::http {
+
+using Io = Connection::Io;
+
+// Stands between a source, which may wake whenever it likes and from any thread, and a session that may have ended.
+// Calls that come before the session has looked are one call.
+class Session::Waker {
+ public:
+  explicit Waker(Session* session) : session_(session) {}
+
+  void wake() {
+    const std::lock_guard lock(mutex_);
+    if (!session_ || is_pending_) return;
+    is_pending_ = true;
+    // Attached means that the session's coroutine runs, and that holds the session.
+    session_->on_strand([session = session_->shared_from_this(), waker = session_->waker_] {
+      waker->has_arrived();
+      session->woken_ = true;
+      session->connection_->notify();
+    });
+  }
+
+  void detach() {
+    const std::lock_guard lock(mutex_);
+    session_ = nullptr;
+  }
+
+ private:
+  void has_arrived() {
+    const std::lock_guard lock(mutex_);
+    is_pending_ = false;
+  }
+
+  std::mutex mutex_;  // guards everything below
+  Session* session_;  // null: detached
+  bool is_pending_ = false;
+};
+
+// On a worker. What the source throws ends the connection without the last chunk, so that the client sees that
+// the body is truncated.
+void Session::pull_stream(bool is_first) {
+  pulled_.reset();
+  std::string what = "a stream threw what is not a std::exception";
+  try {
+    if (is_first) response_.stream->on_ready([waker = waker_] { waker->wake(); });
+    pulled_ = response_.stream->pull(piece_);
+    return;
+  } catch (const std::exception& error) {
+    what = error.what();
+  } catch (...) {
+  }
+  shared_.router.report_failure(request_, what);
+}
+
+Awaitable<bool> Session::send_stream(Framing framing) {
+  waker_ = std::make_shared<Waker>(this);
+  bool is_first = true;
+  for (;;) {
+    // Before the pull: a wake that comes while it runs must lead to another one.
+    woken_ = false;
+    piece_.clear();
+    auto task = as_worker_task([this, is_first] { pull_stream(is_first); });
+    shared_.workers.submit_pull(std::move(task));
+    co_await wait_for_worker();
+    is_first = false;
+    if (closing_) co_return false;
+    if (!pulled_) {
+      if (framing == Framing::kUntilClose) connection_->abort();
+      co_return false;
+    }
+
+    bool is_sent = co_await send_piece(framing, piece_);
+    if (!is_sent) co_return false;
+    if (*pulled_ == BodySource::Pull::kEnd) break;
+    // A stream with a farewell can be taken up again elsewhere; one without goes on to its end, as
+    // long as the server waits for it.
+    const std::string_view farewell = response_.stream->farewell();
+    if (*pulled_ == BodySource::Pull::kWait) {
+      co_await wait_for_stream(farewell);
+      if (closing_ || connection_->peer_has_closed()) co_return false;
+      const bool is_silent = !woken_ && !(draining_ && !farewell.empty());
+      if (is_silent) is_sent = co_await send_piece(framing, response_.stream->keep_alive());
+      if (!is_sent) co_return false;
+    }
+    if (draining_ && !farewell.empty()) {
+      is_sent = co_await send_piece(framing, farewell);
+      if (!is_sent) co_return false;
+      keep_alive_ = false;
+      break;
+    }
+  }
+  if (framing == Framing::kChunked) {
+    const Io io = co_await connection_->write(kLastChunk, shared_.config.write_timeout_ms);
+    co_return io == Io::kDone;
+  }
+  co_return true;
+}
+
+Awaitable<bool> Session::send_piece(Framing framing, std::string_view piece) {
+  if (piece.empty()) co_return true;
+  const std::string chunk = framing == Framing::kChunked ? write_chunk(piece) : std::string(piece);
+  const Io io = co_await connection_->write(chunk, shared_.config.write_timeout_ms);
+  if (io == Io::kDone) sent_bytes_ += piece.size();
+  co_return io == Io::kDone;
+}
+
+// Until the source wakes, the peer goes, the server drains or it is time for a sign of life.
+Awaitable<void> Session::wait_for_stream(std::string_view farewell) {
+  const auto until = Connection::Clock::now() + std::chrono::milliseconds(shared_.config.stream_keep_alive_ms);
+  connection_->watch_peer();
+  while (!woken_ && !closing_ && !connection_->peer_has_closed() && !(draining_ && !farewell.empty()) &&
+         Connection::Clock::now() < until) {
+    co_await connection_->wait(until);
+  }
+}
+
+// The source is destroyed on a worker: it may hold what takes time to give back.
+void Session::let_go_of_stream() {
+  if (waker_) waker_->detach();
+  waker_.reset();
+  if (!response_.stream) return;
+  shared_.workers.submit_pull(
+      [stream = std::shared_ptr<BodySource>(std::move(response_.stream))]() mutable { stream.reset(); });
+}
+
+}  // namespace colony::server::http

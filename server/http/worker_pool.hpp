@@ -1,0 +1,45 @@
+// worker_pool: the threads on which handlers run and streams are pulled, so that an I/O thread never waits for either.
+// Promises that a request is refused at once when too many wait; that pulls are never refused (there is at most one a
+//          connection, so connections_max bounds them); and that neither kind starves the other: they take turns.
+// Threads: synchronises itself.
+#pragma once
+
+#include <condition_variable>
+#include <cstddef>
+#include <deque>
+#include <functional>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+namespace colony::server::http {
+
+class WorkerPool {
+ public:
+  using Task = std::function<void()>;  // must not throw
+
+  WorkerPool(std::size_t thread_count, std::size_t requests_waiting_max);
+  ~WorkerPool();  // as stop()
+
+  void start();
+  /// False: the queue is full (or the pool has stopped), the task will not run.
+  bool submit_request(Task task);
+  void submit_pull(Task task);
+  /// Runs what is queued, then ends the threads. Nothing may be submitted afterwards but by tasks that run.
+  void stop();
+
+ private:
+  void work();
+
+  const std::size_t thread_count_;
+  const std::size_t requests_waiting_max_;
+  std::vector<std::thread> threads_;  // touched by start and stop only
+  std::mutex mutex_;                  // guards everything below
+  std::condition_variable changed_;
+  std::deque<Task> requests_;  // at most requests_waiting_max_
+  std::deque<Task> pulls_;
+  bool pull_is_next_ = false;
+  bool stopping_ = false;
+};
+
+}  // namespace colony::server::http

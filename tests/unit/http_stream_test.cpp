@@ -1,0 +1,393 @@
+// server/http: bodies made piece by piece, over real sockets.
+#include <atomic>
+#include <condition_variable>
+#include <future>
+#include <mutex>
+#include <stdexcept>
+#include <thread>
+#include <vector>
+
+#include "tests/unit/http_support.hpp"
+
+namespace colony::server::http {
+namespace {
+
+/// What a test knows of the sources that a server holds.
+class Watch {
+ public:
+  void created() { change(created_); }
+  void destroyed() { change(destroyed_); }
+  void waiting() { change(waiting_); }
+  void wait_for_destroyed(int count) { wait(destroyed_, count); }
+  void wait_for_waiting(int count) { wait(waiting_, count); }
+  int destroyed_count() {
+    const std::lock_guard lock(mutex_);
+    return destroyed_;
+  }
+  int created_count() {
+    const std::lock_guard lock(mutex_);
+    return created_;
+  }
+
+ private:
+  void change(int& count) {
+    const std::lock_guard lock(mutex_);
+    ++count;
+    changed_.notify_all();
+  }
+  void wait(const int& count, int wanted) {
+    std::unique_lock lock(mutex_);
+    if (!changed_.wait_for(lock, std::chrono::milliseconds(kPatienceMs), [&] { return count >= wanted; })) {
+      throw std::runtime_error("nothing happens");
+    }
+  }
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  int created_ = 0;
+  int destroyed_ = 0;
+  int waiting_ = 0;
+};
+
+/// A source made of a function.
+class Source : public BodySource {
+ public:
+  using Pulls = std::function<Pull(std::string&)>;
+  Source(Watch& watch, Pulls pulls, std::string farewell = "", std::string keep_alive = "")
+      : watch_(watch), pulls_(std::move(pulls)), farewell_(std::move(farewell)), keep_alive_(std::move(keep_alive)) {
+    watch_.created();
+  }
+  ~Source() override { watch_.destroyed(); }
+  Pull pull(std::string& out) override {
+    const Pull result = pulls_(out);
+    if (result == Pull::kWait) watch_.waiting();
+    return result;
+  }
+  std::string_view keep_alive() const override { return keep_alive_; }
+  std::string_view farewell() const override { return farewell_; }
+
+ private:
+  Watch& watch_;
+  Pulls pulls_;
+  std::string farewell_;
+  std::string keep_alive_;
+};
+
+using Pull = BodySource::Pull;
+
+Source::Pulls pieces(std::vector<std::string> all) {
+  return [all = std::move(all), next = std::size_t{0}](std::string& out) mutable {
+    out += all[next++];
+    return next == all.size() ? Pull::kEnd : Pull::kMore;
+  };
+}
+
+Handler source_route(Watch& watch, std::function<Source::Pulls()> make, std::string farewell = "",
+                     std::string keep_alive = "") {
+  return [&watch, make = std::move(make), farewell, keep_alive](const Request&) {
+    return streamed(std::make_unique<Source>(watch, make(), farewell, keep_alive));
+  };
+}
+
+Source::Pulls waits_for_ever() {
+  return [](std::string& out) {
+    if (out.empty()) out += "data: 1\n\n";
+    return Pull::kWait;
+  };
+}
+
+TEST(HttpStream, PiecesBecomeChunksAndTheConnectionStays) {
+  Watch watch;
+  TestServer server([&watch](Router& router) {
+    router.add("GET", "/s", source_route(watch, [] {
+                 return pieces({"one,", "", std::string(70'000, 'x'), "", "end"});
+               }));
+  });
+  server.run();
+  RawClient client(server.port());
+  const std::string whole = "one," + std::string(70'000, 'x') + "end";
+  const Reply reply = client.ask(get("/s") + get("/hello"));
+  EXPECT_EQ(reply.header("Transfer-Encoding"), "chunked");
+  EXPECT_EQ(reply.header("Content-Length"), "(absent)");
+  EXPECT_EQ(reply.body, whole);
+  EXPECT_TRUE(reply.is_complete);
+  EXPECT_EQ(client.read_reply().body, "hello");
+
+  client.send("HEAD /s HTTP/1.1\r\nHost: localhost\r\n\r\n" + get("/hello"));
+  EXPECT_EQ(client.read_reply(true).status, 200);
+  EXPECT_EQ(client.read_reply().body, "hello") << "a HEAD has no chunks";
+
+  RawClient old(server.port());
+  const Reply until_close = old.ask("GET /s HTTP/1.0\r\n" + kHost + "\r\n");
+  EXPECT_EQ(until_close.header("Transfer-Encoding"), "(absent)");
+  EXPECT_EQ(until_close.header("Connection"), "close");
+  EXPECT_EQ(until_close.body, whole);
+  server.stop(0);
+  EXPECT_EQ(watch.destroyed_count(), 3);
+}
+
+TEST(HttpStream, AThrowingPullTruncatesTheBodyVisibly) {
+  Watch watch;
+  std::string heard;
+  TestServer server([&](Router& router) {
+    router.on_failure([&heard](const Request&, std::string_view what) { heard = what; });
+    router.add("GET", "/s", source_route(watch, [] {
+                 return [count = 0](std::string& out) mutable {
+                   if (count++ == 1) throw std::runtime_error("the disk");
+                   out += "begun";
+                   return Pull::kMore;
+                 };
+               }));
+  });
+  server.run();
+  RawClient client(server.port());
+  const Reply reply = client.ask(get("/s"));
+  EXPECT_EQ(reply.status, 200);
+  EXPECT_EQ(reply.body, "begun");
+  EXPECT_FALSE(reply.is_complete) << "no last chunk";
+  server.stop(0);
+  EXPECT_EQ(heard, "the disk");
+  EXPECT_EQ(watch.destroyed_count(), 1);
+}
+
+TEST(HttpStream, AReaderWhoStopsReadingIsCutAndHoldsNothingUp) {
+  ServerConfig config;
+  config.write_timeout_ms = 100;
+  config.worker_threads = 1;
+  Watch watch;
+  std::atomic<int> pull_count{0};
+  TestServer server(
+      [&](Router& router) {
+        router.add("GET", "/s", source_route(watch, [&pull_count] {
+                     return [&pull_count](std::string& out) {
+                       ++pull_count;
+                       out.append(64 * 1024, 'x');
+                       return Pull::kMore;
+                     };
+                   }));
+      },
+      config);
+  server.run();
+  RawClient slow(server.port(), 4096);
+  slow.send(get("/s"));
+  RawClient other(server.port());
+  EXPECT_EQ(other.ask(get("/hello")).body, "hello") << "the only worker is not held";
+  watch.wait_for_destroyed(1);
+  EXPECT_LT(pull_count, 1000) << "no more is made than the socket's buffers take";
+}
+
+TEST(HttpStream, ASlowReaderGetsEveryByte) {
+  Watch watch;
+  constexpr int kPieces = 300;
+  TestServer server([&](Router& router) {
+    router.add("GET", "/s", source_route(watch, [] {
+                 return [count = 0](std::string& out) mutable {
+                   out.append(32 * 1024, static_cast<char>('a' + count % 26));
+                   return ++count == kPieces ? Pull::kEnd : Pull::kMore;
+                 };
+               }));
+  });
+  server.run();
+  RawClient client(server.port(), 4096);
+  const Reply reply = client.ask(get("/s"));
+  EXPECT_TRUE(reply.is_complete);
+  ASSERT_EQ(reply.body.size(), std::size_t{kPieces} * 32 * 1024);
+  for (int i = 0; i < kPieces; ++i) ASSERT_EQ(reply.body[static_cast<std::size_t>(i) * 32 * 1024], 'a' + i % 26);
+}
+
+/// Wakes from its own thread as fast as it can, and notices when two pulls overlap.
+class Restless : public BodySource {
+ public:
+  explicit Restless(std::atomic<int>& overlap_count) : overlap_count_(overlap_count) {}
+  ~Restless() override {
+    stop_ = true;
+    if (thread_.joinable()) thread_.join();
+  }
+  void on_ready(std::function<void()> wake) override {
+    thread_ = std::thread([this, wake = std::move(wake)] {
+      while (!stop_) wake();
+    });
+  }
+  Pull pull(std::string& out) override {
+    if (inside_.exchange(true)) ++overlap_count_;
+    out += std::to_string(++count_) + ",";
+    inside_ = false;
+    return count_ == 500 ? Pull::kEnd : Pull::kWait;
+  }
+
+ private:
+  std::atomic<int>& overlap_count_;
+  std::atomic<bool> stop_{false};
+  std::atomic<bool> inside_{false};
+  int count_ = 0;
+  std::thread thread_;
+};
+
+TEST(HttpStream, IsNeverPulledTwiceAtOnceAndNoWakeIsLost) {
+  ServerConfig config;
+  config.worker_threads = 4;
+  config.io_threads = 2;
+  config.stream_keep_alive_ms = 3'600'000;  // only wakes lead on
+  std::atomic<int> overlap_count{0};
+  TestServer server(
+      [&overlap_count](Router& router) {
+        router.add("GET", "/s",
+                   [&overlap_count](const Request&) { return streamed(std::make_unique<Restless>(overlap_count)); });
+      },
+      config);
+  server.run();
+  RawClient client(server.port());
+  const Reply reply = client.ask(get("/s"));
+  EXPECT_TRUE(reply.is_complete);
+  EXPECT_EQ(reply.body.substr(reply.body.size() - 8), "499,500,");
+  EXPECT_EQ(overlap_count, 0);
+}
+
+TEST(HttpStream, AWakeAfterTheEndIsHarmless) {
+  class Leaky : public BodySource {
+   public:
+    explicit Leaky(std::promise<std::function<void()>>& wake) : wake_(wake) {}
+    void on_ready(std::function<void()> wake) override { wake_.set_value(std::move(wake)); }
+    Pull pull(std::string&) override { return Pull::kEnd; }
+
+   private:
+    std::promise<std::function<void()>>& wake_;
+  };
+  std::promise<std::function<void()>> promise;
+  std::function<void()> wake;
+  {
+    TestServer server([&promise](Router& router) {
+      router.add("GET", "/s", [&promise](const Request&) { return streamed(std::make_unique<Leaky>(promise)); });
+    });
+    server.run();
+    RawClient client(server.port());
+    EXPECT_TRUE(client.ask(get("/s")).is_complete);
+    wake = promise.get_future().get();
+    EXPECT_EQ(client.ask(get("/hello")).status, 200);
+    wake();
+  }
+  wake();
+}
+
+TEST(HttpStream, ADisconnectIsNoticedWhileNothingIsSent) {
+  ServerConfig config;
+  config.stream_keep_alive_ms = 3'600'000;
+  Watch watch;
+  TestServer server([&watch](Router& router) { router.add("GET", "/s", source_route(watch, waits_for_ever)); }, config);
+  server.run();
+  RawClient client(server.port());
+  client.send(get("/s"));
+  ASSERT_TRUE(client.read_until("data: 1"));
+  client.send(get("/hello"));  // a pipelined request does not hide the end behind it
+  client.close();
+  watch.wait_for_destroyed(1);
+}
+
+TEST(HttpStream, ASignOfLifeIsSentAndThenItIsPulledAgain) {
+  ServerConfig config;
+  config.stream_keep_alive_ms = 20;
+  Watch watch;
+  TestServer server(
+      [&watch](Router& router) {
+        router.add("GET", "/s",
+                   source_route(
+                       watch,
+                       [] {
+                         return [count = 0](std::string& out) mutable {
+                           if (++count == 3) out += "third";
+                           return count == 3 ? Pull::kEnd : Pull::kWait;
+                         };
+                       },
+                       "", ": alive\n\n"));
+      },
+      config);
+  server.run();
+  RawClient client(server.port());
+  const Reply reply = client.ask(get("/s"));
+  EXPECT_EQ(reply.body, ": alive\n\n: alive\n\nthird");
+  EXPECT_TRUE(reply.is_complete);
+}
+
+TEST(HttpStream, WatchersHoldNoWorker) {
+  ServerConfig config;
+  config.worker_threads = 1;
+  Watch watch;
+  TestServer server([&watch](Router& router) { router.add("GET", "/s", source_route(watch, waits_for_ever)); }, config);
+  server.run();
+  std::vector<std::unique_ptr<RawClient>> watchers;
+  for (int i = 0; i < 50; ++i) {
+    watchers.push_back(std::make_unique<RawClient>(server.port()));
+    watchers.back()->send(get("/s"));
+    ASSERT_TRUE(watchers.back()->read_until("data: 1"));
+  }
+  watch.wait_for_waiting(50);
+  RawClient client(server.port());
+  EXPECT_EQ(client.ask(get("/hello")).body, "hello");
+}
+
+TEST(HttpStream, StopSaysFarewell) {
+  Watch watch;
+  TestServer server([&watch](Router& router) {
+    router.add("GET", "/waits", source_route(watch, waits_for_ever, "event: bye\n\n"));
+    router.add("GET", "/runs",
+               source_route(
+                   watch,
+                   [] {
+                     return [](std::string& out) {
+                       out += "data: more\n\n";
+                       return Pull::kMore;
+                     };
+                   },
+                   "event: bye\n\n"));
+  });
+  server.run();
+  RawClient waits(server.port());
+  waits.send(get("/waits"));
+  ASSERT_TRUE(waits.read_until("data: 1"));
+  RawClient runs(server.port());
+  runs.send(get("/runs"));
+  ASSERT_TRUE(runs.read_until("data: more"));
+  std::thread stopper([&server] { server.stop(kPatienceMs); });
+  EXPECT_NE(waits.read_to_end().find("event: bye\n\n\r\n0\r\n\r\n"), std::string::npos);
+  const std::string rest = runs.read_to_end();
+  const std::string ending = "c\r\nevent: bye\n\n\r\n0\r\n\r\n";
+  ASSERT_GE(rest.size(), ending.size());
+  EXPECT_EQ(rest.substr(rest.size() - ending.size()), ending);
+  stopper.join();
+  EXPECT_EQ(watch.destroyed_count(), 2);
+}
+
+TEST(HttpStream, StopEndsWithStreamsIdleAndSlowClientsOpen) {
+  Watch watch;
+  TestServer server([&watch](Router& router) {
+    router.add("GET", "/stays", source_route(watch, waits_for_ever));  // no farewell: it would like to stay for ever
+    router.add("GET", "/bye", source_route(watch, waits_for_ever, "event: bye\n\n"));
+    router.add("GET", "/floods", source_route(watch, [] {
+                 return [](std::string& out) {
+                   out.append(64 * 1024, 'x');
+                   return Pull::kMore;
+                 };
+               }));
+  });
+  server.run();
+  std::vector<std::unique_ptr<RawClient>> clients;
+  const auto add = [&](const std::string& bytes, const char* until) {
+    clients.push_back(std::make_unique<RawClient>(server.port(), 4096));
+    clients.back()->send(bytes);
+    if (until) {
+      ASSERT_TRUE(clients.back()->read_until(until));
+    }
+  };
+  for (int i = 0; i < 50; ++i) add(get(i % 2 == 0 ? "/stays" : "/bye"), "data: 1");
+  for (int i = 0; i < 5; ++i) add(get("/floods"), "xxxx");
+  for (int i = 0; i < 5; ++i) add(get("/hello"), "hello");
+  for (int i = 0; i < 5; ++i) add("GET /hel", nullptr);
+  for (int i = 0; i < 5; ++i) add("POST /echo HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9\r\n\r\nabc", nullptr);
+  for (int i = 0; i < 5; ++i) add("", nullptr);
+  server.stop(50);
+  EXPECT_EQ(watch.destroyed_count(), watch.created_count());
+  EXPECT_EQ(watch.created_count(), 55);
+  for (auto& client : clients) client->read_to_end();
+}
+
+}  // namespace
+}  // namespace colony::server::http
