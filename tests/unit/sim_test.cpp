@@ -50,7 +50,7 @@ TEST(Rules, GenerationLimitGivesAtMostTwoToTheLimitAndEndsAllSenescent) {
 }
 
 TEST(Rules, InhibitionOffAcceptsTheBestCandidateWhateverItsFitness) {
-  RunSpec spec = testing::spec_of(2, 120);
+  RunSpec spec = testing::spec_of(2, 80);
   spec.params.division.inhibition = false;
   const testing::Run run = testing::run(spec);
   double least = 1.0;

@@ -69,7 +69,7 @@ TEST(Waking, WakesExactlyTheSleepersNearAChangeThatGainedRoom) {
 
 TEST(Waking, AlwaysCostsManyMoreSearchesThanShare) {
   const auto searches_per_division = [](WakeRule rule) {
-    RunSpec spec = testing::spec_of(6, 120);
+    RunSpec spec = testing::spec_of(6, 80);
     spec.params.wake.rule = rule;
     const testing::Run run = testing::run(spec);
     double searches = 0.0, divisions = 0.0;
@@ -80,7 +80,7 @@ TEST(Waking, AlwaysCostsManyMoreSearchesThanShare) {
     return searches / divisions;
   };
   const double share = searches_per_division(WakeRule::kShare), always = searches_per_division(WakeRule::kAlways);
-  std::printf("searches per division at 120 cells: share %.2f, always %.2f\n", share, always);
+  std::printf("searches per division at 80 cells: share %.2f, always %.2f\n", share, always);
   EXPECT_LT(share, 5.0);
   EXPECT_GT(always, 2.0 * share);
 }
