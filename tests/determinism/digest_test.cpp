@@ -1,15 +1,15 @@
-// One committed digest for each scene: the same spec and seed give the same bytes on any machine, any vector width, any window.
-// UPDATE_DIGESTS=1 rewrites digests.txt; a change of it is a change of results and belongs in the CHANGELOG.
+// One committed digest for each scene: the same spec and seed give the same bytes on any machine, any vector width, any
+// window. UPDATE_DIGESTS=1 rewrites digests.txt; a change of it is a change of results and belongs in the CHANGELOG.
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
+#include <hwy/targets.h>
 #include <map>
 #include <set>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 
 #include "engine/space/overlap_kernel.hpp"
 #include "tests/support/runs.hpp"
@@ -79,7 +79,8 @@ TEST(Digests, AreTheCommittedOnes) {
     const std::size_t space = line.find(' ');
     committed[line.substr(0, space)] = line.substr(space + 1);
   }
-  EXPECT_EQ(found, committed) << "results changed: if that is meant, UPDATE_DIGESTS=1 and a CHANGELOG line under Results";
+  EXPECT_EQ(found, committed)
+      << "results changed: if that is meant, UPDATE_DIGESTS=1 and a CHANGELOG line under Results";
 }
 
 TEST(Digests, DoNotDependOnTheWindow) {
@@ -117,7 +118,8 @@ TEST(Digests, DoNotDependOnTheVectorWidth) {
 
 TEST(Digests, DifferBySeed) {
   std::map<std::string, Seed> seen;
-  for (Seed seed = 0; seed < 20; ++seed) EXPECT_TRUE(seen.emplace(digest_of(testing::spec_of(seed, 2)), seed).second) << seed;
+  for (Seed seed = 0; seed < 20; ++seed)
+    EXPECT_TRUE(seen.emplace(digest_of(testing::spec_of(seed, 2)), seed).second) << seed;
 }
 
 }  // namespace

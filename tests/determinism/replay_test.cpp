@@ -51,8 +51,8 @@ TEST(Replay, EveryPrefixGoesOnWithTheSameBytes) {
       for (std::size_t i = at; i < end; ++i) {
         const std::optional<Event> event = again.step();
         ASSERT_TRUE(event) << scene.name << ", replayed to seq " << at;
-        ASSERT_TRUE(*event == live.events[i]) << scene.name << ", " << testing::name_of_run(scene.spec) << ", replayed to seq " << at
-                                              << ", differs at seq " << i + 1;
+        ASSERT_TRUE(*event == live.events[i]) << scene.name << ", " << testing::name_of_run(scene.spec)
+                                              << ", replayed to seq " << at << ", differs at seq " << i + 1;
       }
       if (end < live.events.size()) continue;
       ASSERT_FALSE(again.step()) << scene.name;
@@ -76,7 +76,8 @@ TEST(Replay, TheAgendaFoldedFromEventsEqualsTheLiveOneAndTheCellsDueTimes) {
         if (cell.due_h) due.insert({*cell.due_h, DueKind::kDivide, cell.id});
       }
       ASSERT_EQ(agenda.items(), due) << scene.name << " seq " << event->seq;
-      ASSERT_TRUE(std::equal(folded.cells().begin(), folded.cells().end(), live.colony().cells().begin(), live.colony().cells().end()));
+      ASSERT_TRUE(std::equal(folded.cells().begin(), folded.cells().end(), live.colony().cells().begin(),
+                             live.colony().cells().end()));
     }
   }
 }

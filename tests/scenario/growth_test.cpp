@@ -22,18 +22,18 @@ constexpr double kMissing = -1.0;
 /// The figures of one colony.
 struct Figures {
   Seed seed = 0;
-  double doubling_h = kMissing;               // while N <= 12
+  double doubling_h = kMissing;  // while N <= 12
   double time_12_h = kMissing, time_end_h = kMissing;
-  testing::Line radius;                       // um on h, from 40 cells on
+  testing::Line radius;  // um on h, from 40 cells on
   double radius_end_um = 0.0;
   double active_share = 0.0;
-  double active_radial = 0.0, passive_radial = 0.0;   // mean distance from the centre over the colony's radius
+  double active_radial = 0.0, passive_radial = 0.0;  // mean distance from the centre over the colony's radius
   double centre_volume_um3 = 0.0, edge_volume_um3 = 0.0;
   double volume_early_um3 = 0.0, volume_end_um3 = 0.0;  // mean volume at 8 cells and at the end
-  double volume_slope_um3 = 0.0;              // of the mean volume on ln N
+  double volume_slope_um3 = 0.0;                        // of the mean volume on ln N
   double searches_per_division = 0.0;
-  std::uint64_t above_dish_count = 0;         // bodies that do not reach the dish
-  double centre_distance_min_um = 0.0;        // of two cells' projections
+  std::uint64_t above_dish_count = 0;   // bodies that do not reach the dish
+  double centre_distance_min_um = 0.0;  // of two cells' projections
 };
 
 struct Sample {
@@ -54,7 +54,8 @@ double doubling_of(const std::vector<std::pair<double, std::uint64_t>>& counts, 
 
 void measure_end(const Colony& colony, Figures& f) {
   Vec2 centre = Vec2::Zero();
-  for (const Cell& cell : colony.cells()) centre += cell.centre_um.head<2>() / static_cast<double>(colony.cells().size());
+  for (const Cell& cell : colony.cells())
+    centre += cell.centre_um.head<2>() / static_cast<double>(colony.cells().size());
   std::vector<double> active, passive, inner, outer;
   f.centre_distance_min_um = 1e9;
   for (const Cell& cell : colony.cells()) {
@@ -65,7 +66,8 @@ void measure_end(const Colony& colony, Figures& f) {
     if (!(cell.centre_um.z() < colony.body(cell.id).half_width_um(Vec3::UnitZ()))) ++f.above_dish_count;
     for (const Cell& other : colony.cells()) {
       if (other.id.value >= cell.id.value) break;
-      f.centre_distance_min_um = std::min(f.centre_distance_min_um, (cell.centre_um - other.centre_um).head<2>().norm());
+      f.centre_distance_min_um =
+          std::min(f.centre_distance_min_um, (cell.centre_um - other.centre_um).head<2>().norm());
     }
   }
   f.active_share = static_cast<double>(active.size()) / static_cast<double>(colony.cells().size());
@@ -147,14 +149,20 @@ testing::Mean over_seeds(double (*figure)(const Figures&)) {
 
 // One test, because the colonies are grown once a process.
 TEST(Growth, IsExponentialThenLimitedByContactWithSmallPassiveCellsInTheMiddleOfOneLayer) {
-  std::printf("seed  12 cells h  doubling h  end h  R um  um/h    R2   active  r active  r passive  V centre  V edge  V 8 cells  V end  searches/division  least distance um\n");
+  std::printf(
+      "seed  12 cells h  doubling h  end h  R um  um/h    R2   active  r active  r passive  V centre  V edge  V 8 "
+      "cells  V end  searches/division  least distance um\n");
   for (const Figures& f : all_figures()) {
-    std::printf("%4u  %10.1f  %10.2f  %5.0f  %4.0f  %.3f  %.3f  %6.2f  %8.2f  %9.2f  %8.0f  %6.0f  %9.0f  %5.0f  %17.2f  %17.2f\n",
-                static_cast<unsigned>(f.seed), f.time_12_h, f.doubling_h, f.time_end_h, f.radius_end_um, f.radius.slope, f.radius.r2,
-                f.active_share, f.active_radial, f.passive_radial, f.centre_volume_um3, f.edge_volume_um3, f.volume_early_um3,
-                f.volume_end_um3, f.searches_per_division, f.centre_distance_min_um);
+    std::printf(
+        "%4u  %10.1f  %10.2f  %5.0f  %4.0f  %.3f  %.3f  %6.2f  %8.2f  %9.2f  %8.0f  %6.0f  %9.0f  %5.0f  %17.2f  "
+        "%17.2f\n",
+        static_cast<unsigned>(f.seed), f.time_12_h, f.doubling_h, f.time_end_h, f.radius_end_um, f.radius.slope,
+        f.radius.r2, f.active_share, f.active_radial, f.passive_radial, f.centre_volume_um3, f.edge_volume_um3,
+        f.volume_early_um3, f.volume_end_um3, f.searches_per_division, f.centre_distance_min_um);
   }
-  const auto print = [](const char* name, const testing::Mean& mean) { std::printf("%-42s %9.3f +- %.3f\n", name, mean.value, mean.se); };
+  const auto print = [](const char* name, const testing::Mean& mean) {
+    std::printf("%-42s %9.3f +- %.3f\n", name, mean.value, mean.se);
+  };
   const testing::Mean doubling = over_seeds([](const Figures& f) { return f.doubling_h; });
   const testing::Mean speed = over_seeds([](const Figures& f) { return f.radius.slope; });
   const testing::Mean rim = over_seeds([](const Figures& f) { return f.active_radial - f.passive_radial; });

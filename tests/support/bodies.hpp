@@ -42,7 +42,8 @@ inline BodyGeometry any_ellipsoid(Stream& stream, double spread_um) {
   BodyGeometry g;
   for (int i = 0; i < 3; ++i) g.semiaxes_um[i] = stream.uniform({2.0, 15.0});
   g.rotation_rad = unit_vector(stream) * stream.uniform({0.0, maths::kPi});
-  g.centre_um = Vec3(stream.uniform({-spread_um, spread_um}), stream.uniform({-spread_um, spread_um}), stream.uniform({-1.0, 10.0}));
+  g.centre_um = Vec3(stream.uniform({-spread_um, spread_um}), stream.uniform({-spread_um, spread_um}),
+                     stream.uniform({-1.0, 10.0}));
   for (int i = 0; i < 3; ++i) g.noise_offset[i] = stream.uniform({0.0, 54.0 * maths::kPi / 5.0});
   return g;
 }

@@ -32,7 +32,8 @@ inline Run run(const RunSpec& spec) {
 }
 
 inline std::string name_of_run(const RunSpec& spec) {
-  return "seed " + std::to_string(spec.seed) + (spec.until.cells ? " to " + std::to_string(*spec.until.cells) + " cells" : "") +
+  return "seed " + std::to_string(spec.seed) +
+         (spec.until.cells ? " to " + std::to_string(*spec.until.cells) + " cells" : "") +
          (spec.until.time_h ? " to " + std::to_string(*spec.until.time_h) + " h" : "");
 }
 
@@ -40,7 +41,8 @@ inline std::string name_of_run(const RunSpec& spec) {
 inline std::vector<const Body*> neighbours_of(const Colony& colony, CellId id) {
   std::vector<const Body*> bodies;
   for (const Cell& other : colony.cells()) {
-    if (other.id != id && meets(colony.body(other.id).box(), colony.body(id).box())) bodies.push_back(&colony.body(other.id));
+    if (other.id != id && meets(colony.body(other.id).box(), colony.body(id).box()))
+      bodies.push_back(&colony.body(other.id));
   }
   return bodies;
 }

@@ -1,5 +1,5 @@
-// scale: how long the statistical tests run. COLONY_TEST_FULL=1 asks for the full sizes; reduced ones keep a check under seconds.
-// Bands in the tests are standard errors or bounds that hold for both sizes.
+// scale: how long the statistical tests run. COLONY_TEST_FULL=1 asks for the full sizes; reduced ones keep a check
+// under seconds. Bands in the tests are standard errors or bounds that hold for both sizes.
 #pragma once
 
 #include <cstdlib>

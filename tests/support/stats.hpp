@@ -9,7 +9,7 @@ namespace colony::testing {
 
 struct Mean {
   double value = 0.0;
-  double se = 0.0;       // standard error of the mean
+  double se = 0.0;  // standard error of the mean
 };
 
 inline Mean mean_of(const std::vector<double>& x) {
@@ -62,7 +62,8 @@ inline double chi_square_uniform(const std::vector<double>& counts) {
   return sum;
 }
 
-/// A bound that chi-square with that many degrees of freedom exceeds with probability below 1e-6 (Wilson-Hilferty, z = 4.9).
+/// A bound that chi-square with that many degrees of freedom exceeds with probability below 1e-6 (Wilson-Hilferty, z
+/// = 4.9).
 inline double chi_square_bound(std::size_t degrees) {
   const auto k = static_cast<double>(degrees);
   const double t = 1.0 - 2.0 / (9.0 * k) + 4.9 * std::sqrt(2.0 / (9.0 * k));

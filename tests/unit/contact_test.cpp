@@ -14,7 +14,8 @@ namespace {
 constexpr std::array<ContactRule, 2> kRules = {ContactRule::kSum, ContactRule::kMax};
 
 TEST(Contact, TheFaceOfEqualParallelEllipsoidsIsThePlaneOfEqualFields) {
-  // Noise-free and parallel: f_i - f_j is linear, the face lies half way, across the line of centres in the cells' frame.
+  // Noise-free and parallel: f_i - f_j is linear, the face lies half way, across the line of centres in the cells'
+  // frame.
   for (std::uint32_t number = 1; number <= 20; ++number) {
     Stream stream = testing::case_stream(number);
     BodyGeometry g = testing::any_ellipsoid(stream, 0.0);
@@ -32,8 +33,10 @@ TEST(Contact, TheFaceOfEqualParallelEllipsoidsIsThePlaneOfEqualFields) {
       const double side = apart.dot(a.to_unit() * (p - middle));  // > 0: nearer to b
       if (std::abs(side) < 1e-9) continue;
       for (const ContactRule rule : kRules) {
-        ASSERT_EQ(deformed_contains(a, near_a, rule, p), a.contains(p) && (side < 0.0 || !b.contains(p))) << "case " << number;
-        ASSERT_EQ(deformed_contains(b, near_b, rule, p), b.contains(p) && (side > 0.0 || !a.contains(p))) << "case " << number;
+        ASSERT_EQ(deformed_contains(a, near_a, rule, p), a.contains(p) && (side < 0.0 || !b.contains(p)))
+            << "case " << number;
+        ASSERT_EQ(deformed_contains(b, near_b, rule, p), b.contains(p) && (side > 0.0 || !a.contains(p)))
+            << "case " << number;
       }
     }
   }
@@ -59,7 +62,8 @@ TEST(Contact, EachOfTwoEqualParallelEllipsoidsLosesHalfTheLens) {
 TEST(Contact, NoisyNeighboursShareTheirFaceWithoutGapOrOverlap) {
   for (std::uint32_t number = 1; number <= 30; ++number) {
     Stream stream = testing::case_stream(number);
-    const Body a(testing::spread_cell(stream, 0.0, 0.0, 0.0), testing::rough()), b(testing::spread_cell(stream, 10.0, 0.0, 2.0), testing::rough());
+    const Body a(testing::spread_cell(stream, 0.0, 0.0, 0.0), testing::rough()),
+        b(testing::spread_cell(stream, 10.0, 0.0, 2.0), testing::rough());
     const std::array<const Body*, 1> near_a = {&b}, near_b = {&a};
     for (int i = 0; i < 2000; ++i) {
       const Vec3 p(stream.uniform({-15, 25}), stream.uniform({-15, 15}), stream.uniform({0, 8}));
@@ -90,14 +94,16 @@ TEST(Contact, DeformedContainsIsTheSignOfTheDeformedField) {
           taken = rule == ContactRule::kSum ? taken + f : std::max(taken, f);
         }
         ASSERT_EQ(deformed_field(body, near, rule, p), body.field(p) - taken);
-        ASSERT_EQ(deformed_contains(body, near, rule, p), p.z() >= 0.0 && body.field(p) - taken >= 0.0) << "case " << number;
+        ASSERT_EQ(deformed_contains(body, near, rule, p), p.z() >= 0.0 && body.field(p) - taken >= 0.0)
+            << "case " << number;
       }
     }
   }
 }
 
-// Share of the union of hexagonally packed discs that belongs to no deformed cell. Discs: the plane through the centres of spheres.
-// Spacing up to sqrt(3) R the discs cover the plane, so the share of the union is the share of the plane: one unit cell suffices.
+// Share of the union of hexagonally packed discs that belongs to no deformed cell. Discs: the plane through the centres
+// of spheres. Spacing up to sqrt(3) R the discs cover the plane, so the share of the union is the share of the plane:
+// one unit cell suffices.
 double void_share(double spacing, ContactRule rule, int side) {
   const double radius = 1.0, z = 10.0;
   std::vector<Body> discs;
@@ -142,7 +148,8 @@ TEST(Contact, SumLeavesTheStatedVoidsBetweenHexagonalDiscs) {
 }
 
 TEST(Contact, MaxIsAnExactPartition) {
-  for (const double spacing : {1.80, 1.60, 1.50, 1.30, 1.0}) EXPECT_EQ(void_share(spacing, ContactRule::kMax, 100), 0.0) << spacing;
+  for (const double spacing : {1.80, 1.60, 1.50, 1.30, 1.0})
+    EXPECT_EQ(void_share(spacing, ContactRule::kMax, 100), 0.0) << spacing;
 }
 
 }  // namespace

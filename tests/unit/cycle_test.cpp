@@ -47,7 +47,7 @@ TEST(Cycle, NormalCyclesDoubleThePopulationIn11887Hours) {
   const auto [low, high] = std::minmax_element(times.begin(), times.end());
   EXPECT_GE(*low, 6.0);
   EXPECT_LE(*high, 18.0);
-  EXPECT_LT(*low, 6.1);    // the tails are cut, not missing
+  EXPECT_LT(*low, 6.1);  // the tails are cut, not missing
   EXPECT_GT(*high, 17.9);
   const testing::Mean mean = testing::mean_of(times);
   EXPECT_NEAR(mean.value, 12.0, 5.0 * mean.se);
@@ -95,7 +95,11 @@ TEST(Cycle, SiblingsCorrelateAsAskedAndKeepTheMarginalDistribution) {
       const double sd = normal ? 1.97 : 2.0 / std::sqrt(3.0);
       EXPECT_NEAR(std::sqrt(saa / static_cast<double>(pairs)), sd, 0.03);
       const auto [low, high] = std::minmax_element(b.begin(), b.end());
-      const Interval range = cycle_range_h([&] { Params p; p.cycle = cycle; return p; }());
+      const Interval range = cycle_range_h([&] {
+        Params p;
+        p.cycle = cycle;
+        return p;
+      }());
       EXPECT_GE(*low, range.low);
       EXPECT_LE(*high, range.high);
     }

@@ -17,9 +17,12 @@ namespace colony {
 namespace {
 
 TEST(SplittingPlane, AngleErrorAgainstTheShortAxisFallsWithElongation) {
-  // A smooth, untilted, spread cell: the membrane nearest to its nucleus lies at the ends of the short axis, which 4,096 points
-  // find to within this error. The model's 21 deg at 1.1 and 14 deg at 1.3 are what nine cells of ten stay below.
-  struct Row { double elongation, mean_deg, ninth_decile_deg; };
+  // A smooth, untilted, spread cell: the membrane nearest to its nucleus lies at the ends of the short axis, which
+  // 4,096 points find to within this error. The model's 21 deg at 1.1 and 14 deg at 1.3 are what nine cells of ten stay
+  // below.
+  struct Row {
+    double elongation, mean_deg, ninth_decile_deg;
+  };
   const std::uint32_t repeats = testing::scaled(400U, 4000U);
   for (const Row& row : {Row{1.1, 9.9, 20.5}, Row{1.3, 7.0, 14.2}, Row{1.5, 6.3, 12.9}, Row{1.7, 5.8, 11.6}}) {
     std::vector<double> errors;
@@ -44,7 +47,8 @@ TEST(SplittingPlane, AngleErrorAgainstTheShortAxisFallsWithElongation) {
     const testing::Mean mean = testing::mean_of(errors);
     std::sort(errors.begin(), errors.end());
     const double ninth_decile = errors[errors.size() * 9 / 10];
-    std::printf("A/B %.1f: mean angle error %.2f +- %.2f deg, 90 %% below %.1f deg\n", row.elongation, mean.value, mean.se, ninth_decile);
+    std::printf("A/B %.1f: mean angle error %.2f +- %.2f deg, 90 %% below %.1f deg\n", row.elongation, mean.value,
+                mean.se, ninth_decile);
     EXPECT_NEAR(mean.value, row.mean_deg, 1.0) << row.elongation;
     EXPECT_NEAR(ninth_decile, row.ninth_decile_deg, 2.0) << row.elongation;
   }
@@ -77,8 +81,8 @@ TEST(SplittingPlane, NearestMembraneIsTheNearestOfThePointsOutside) {
     double least = 1e9;
     for (std::size_t i = 0; i < points.size(); ++i) {
       const Box& box = body.box();
-      const Vec3 p(box.low.x() + points.x[i] * (box.high.x() - box.low.x()), box.low.y() + points.y[i] * (box.high.y() - box.low.y()),
-                   low + points.z[i] * (high - low));
+      const Vec3 p(box.low.x() + points.x[i] * (box.high.x() - box.low.x()),
+                   box.low.y() + points.y[i] * (box.high.y() - box.low.y()), low + points.z[i] * (high - low));
       if (deformed_field(body, near, ContactRule::kSum, p) < 0.0) least = std::min(least, (p - c).norm());
     }
     EXPECT_NEAR((*found - c).norm(), least, 1e-9) << "case " << number;
@@ -125,10 +129,13 @@ TEST(Chromosome, CrossoverTakesTheHeadOfOneAndTheTailOfTheOther) {
   Stream stream = testing::case_stream(1);
   for (const int bits : {4, 7, 8, 16}) {
     const Chromosome a = random_chromosome(bits, stream), b = random_chromosome(bits, stream);
-    const auto bit_of = [&](const Chromosome& c, int bit) { return (c.code(bit / bits) >> (bits - 1 - bit % bits)) & 1U; };
+    const auto bit_of = [&](const Chromosome& c, int bit) {
+      return (c.code(bit / bits) >> (bits - 1 - bit % bits)) & 1U;
+    };
     for (int cut = 0; cut <= a.length(); ++cut) {
       const Chromosome child = crossover(a, b, cut);
-      for (int bit = 0; bit < a.length(); ++bit) ASSERT_EQ(bit_of(child, bit), bit_of(bit < cut ? a : b, bit)) << "cut " << cut;
+      for (int bit = 0; bit < a.length(); ++bit)
+        ASSERT_EQ(bit_of(child, bit), bit_of(bit < cut ? a : b, bit)) << "cut " << cut;
     }
   }
 }
@@ -197,13 +204,16 @@ RC_GTEST_PROP(Decode, EveryStringIsAPairInsideAllRangesAndInsideTheSearchReach, 
       RC_ASSERT(upright >= std::cos(tilt) * std::cos(tilt) - 1e-9);
       const Body body(g, p.noise);
       const Vec3 offset = g.centre_um - frame.pivot_um;
-      const double along = offset.dot(pair.direction), across = offset.dot(Vec3(-pair.direction.y(), pair.direction.x(), 0.0));
+      const double along = offset.dot(pair.direction),
+                   across = offset.dot(Vec3(-pair.direction.y(), pair.direction.x(), 0.0));
       RC_ASSERT((k == 0) == (along < 0.0));  // the larger share on the side -n
       RC_ASSERT(within(p.search.distance, std::abs(along) / body.half_width_um(pair.direction)));
       RC_ASSERT(std::abs(across) <= p.search.sideways * mean + 1e-9);
       for (int axis = 0; axis < 2; ++axis) {
-        RC_ASSERT(body.box().high[axis] <= frame.pivot_um[axis] + reach && body.box().low[axis] >= frame.pivot_um[axis] - reach);
-        RC_ASSERT(body.box().high[axis] - g.centre_um[axis] <= extent && g.centre_um[axis] - body.box().low[axis] <= extent);
+        RC_ASSERT(body.box().high[axis] <= frame.pivot_um[axis] + reach &&
+                  body.box().low[axis] >= frame.pivot_um[axis] - reach);
+        RC_ASSERT(body.box().high[axis] - g.centre_um[axis] <= extent &&
+                  g.centre_um[axis] - body.box().low[axis] <= extent);
       }
     }
     RC_ASSERT(within(p.cell.pair_volume_um3, volumes[0] + volumes[1]));
@@ -230,7 +240,8 @@ TEST(Orientation, TiltsThenTurnsAboutTheVertical) {
   EXPECT_LT((m * Vec3::UnitX() - Vec3::UnitY()).norm(), 1e-12);
   const Mat3 tilted = rotation_matrix(orientation_rad(0.3, 0.1, 0.0));
   EXPECT_NEAR(tilted(2, 2), std::cos(0.1), 1e-12);
-  EXPECT_LT((tilted.col(0) - Vec3(std::cos(0.3), std::sin(0.3), 0.0)).norm(), 1e-12);  // the tilt about x leaves the axis A level
+  EXPECT_LT((tilted.col(0) - Vec3(std::cos(0.3), std::sin(0.3), 0.0)).norm(),
+            1e-12);  // the tilt about x leaves the axis A level
 }
 
 }  // namespace

@@ -1,4 +1,5 @@
-// The engine's own functions against the C library's in long double (64-bit mantissa), with stated bounds in units in the last place.
+// The engine's own functions against the C library's in long double (64-bit mantissa), with stated bounds in units in
+// the last place.
 #include "engine/base/maths.hpp"
 
 #include <cmath>
@@ -36,8 +37,12 @@ TEST(Maths, SineAndCosineAreWithinTwoUlpAndThreeAtTheEndOfTheRange) {
   for (const double range : {0.1, 1.0, 10.0, 1e3, 1e5}) {
     const double bound = range > 1e3 ? 3.0 : 2.0;  // the reduction adds its own rounding
     const auto draw = [&](Stream& s) { return s.uniform({-range, range}); };
-    EXPECT_LE(worst_ulps([](double x) { return maths::sincos(x).sin; }, [](long double x) { return sinl(x); }, draw), bound) << range;
-    EXPECT_LE(worst_ulps([](double x) { return maths::sincos(x).cos; }, [](long double x) { return cosl(x); }, draw), bound) << range;
+    EXPECT_LE(worst_ulps([](double x) { return maths::sincos(x).sin; }, [](long double x) { return sinl(x); }, draw),
+              bound)
+        << range;
+    EXPECT_LE(worst_ulps([](double x) { return maths::sincos(x).cos; }, [](long double x) { return cosl(x); }, draw),
+              bound)
+        << range;
   }
 }
 
@@ -56,10 +61,15 @@ TEST(Maths, SineAndCosineAreExactAtZeroAndCloseAtMultiplesOfHalfPi) {
 TEST(Maths, LogarithmIsWithinTwoUlp) {
   const auto ours = [](double x) { return maths::log(x); };
   const auto exact = [](long double x) { return logl(x); };
-  EXPECT_LE(worst_ulps(ours, exact, [](Stream& s) { return std::ldexp(1.0 + s.uniform(), static_cast<int>(s.below(2000)) - 1000); }), 2.0);
-  EXPECT_LE(worst_ulps(ours, exact, [](Stream& s) { return 0.5 + s.uniform(); }), 2.0);          // cancellation near 1
+  EXPECT_LE(worst_ulps(ours, exact,
+                       [](Stream& s) { return std::ldexp(1.0 + s.uniform(), static_cast<int>(s.below(2000)) - 1000); }),
+            2.0);
+  EXPECT_LE(worst_ulps(ours, exact, [](Stream& s) { return 0.5 + s.uniform(); }), 2.0);  // cancellation near 1
   EXPECT_LE(worst_ulps(ours, exact, [](Stream& s) { return 1.0 + (s.uniform() - 0.5) * 1e-6; }), 2.0);
-  EXPECT_LE(worst_ulps(ours, exact, [](Stream& s) { return (1.0 + static_cast<double>(s.below(1U << 30))) * 4.9406564584124654e-324; }), 2.0);
+  EXPECT_LE(
+      worst_ulps(ours, exact,
+                 [](Stream& s) { return (1.0 + static_cast<double>(s.below(1U << 30))) * 4.9406564584124654e-324; }),
+      2.0);
   EXPECT_EQ(maths::log(1.0), 0.0);
 }
 
@@ -76,8 +86,13 @@ TEST(Maths, CubeRootIsWithinTwoUlpAndExactOnCubes) {
   const auto ours = [](double x) { return maths::cbrt(x); };
   const auto exact = [](long double x) { return cbrtl(x); };
   EXPECT_LE(worst_ulps(ours, exact, [](Stream& s) { return s.uniform({-1000.0, 1000.0}); }), 2.0);
-  EXPECT_LE(worst_ulps(ours, exact, [](Stream& s) { return std::ldexp(1.0 + s.uniform(), static_cast<int>(s.below(2040)) - 1020); }), 2.0);
-  EXPECT_LE(worst_ulps(ours, exact, [](Stream& s) { return (1.0 + static_cast<double>(s.below(1U << 30))) * 4.9406564584124654e-324; }), 2.0);
+  EXPECT_LE(worst_ulps(ours, exact,
+                       [](Stream& s) { return std::ldexp(1.0 + s.uniform(), static_cast<int>(s.below(2040)) - 1020); }),
+            2.0);
+  EXPECT_LE(
+      worst_ulps(ours, exact,
+                 [](Stream& s) { return (1.0 + static_cast<double>(s.below(1U << 30))) * 4.9406564584124654e-324; }),
+      2.0);
   for (int k = -100; k <= 100; ++k) EXPECT_EQ(maths::cbrt(static_cast<double>(k) * k * k), k);
 }
 

@@ -113,7 +113,8 @@ std::vector<Case> cases() {
   all.push_back({event_of(divided), {}});
   auto& changes = all.back().changes;
   for (std::size_t k = 0; k < 2; ++k) {
-    add_cell_changes(changes, "divided " + std::to_string(k) + " ", [k](Event& e) -> Cell& { return std::get<Divided>(e.body).cells[k]; });
+    add_cell_changes(changes, "divided " + std::to_string(k) + " ",
+                     [k](Event& e) -> Cell& { return std::get<Divided>(e.body).cells[k]; });
   }
   for (int i = 0; i < 3; ++i) {
     changes.push_back({"plane point", [i](Event& e) { std::get<Divided>(e.body).plane_point_um[i] += 1; }});
@@ -183,8 +184,8 @@ TEST(Digest, FinishedStaysOutsideTheChain) {
 TEST(Digest, HexRoundTripsAndRefusesAnythingElse) {
   const std::string hex = "00112233445566778899aabbccddeeff";
   EXPECT_EQ(Digest::from_hex(hex)->hex(), hex);
-  for (const char* bad : {"", "0", "00112233445566778899aabbccddeef", "00112233445566778899aabbccddeeff0", "00112233445566778899AABBCCDDEEFF",
-                          "0011223344556677 899aabbccddeeff"}) {
+  for (const char* bad : {"", "0", "00112233445566778899aabbccddeef", "00112233445566778899aabbccddeeff0",
+                          "00112233445566778899AABBCCDDEEFF", "0011223344556677 899aabbccddeeff"}) {
     EXPECT_FALSE(Digest::from_hex(bad)) << bad;
   }
 }
@@ -196,7 +197,8 @@ TEST(Canonicalise, NegativeZeroBecomesZeroEverywhereAndNanOrInfinityFailsACheck)
     EXPECT_THROW(digest_after(Digest{}, event), CheckFailure);  // raw -0.0 never enters the bytes
     canonicalise(event);
     const auto& settled = std::get<Settled>(event.body);
-    for (const double value : {event.time_h, settled.nucleus_um.x(), settled.nearest_membrane_um.y(), settled.deformed_volume_um3, *settled.due_h}) {
+    for (const double value : {event.time_h, settled.nucleus_um.x(), settled.nearest_membrane_um.y(),
+                               settled.deformed_volume_um3, *settled.due_h}) {
       EXPECT_FALSE(std::signbit(value));
     }
     EXPECT_NO_THROW(digest_after(Digest{}, event));
@@ -211,7 +213,11 @@ TEST(Canonicalise, NegativeZeroBecomesZeroEverywhereAndNanOrInfinityFailsACheck)
     cell.nearest_membrane_um->z() = bad;
     Event founded = event_of(Founded{cell});
     EXPECT_THROW(canonicalise(founded), CheckFailure);
-    Event divided = event_of([&] { Divided d; d.cells = {full_cell(1), cell}; return d; }());
+    Event divided = event_of([&] {
+      Divided d;
+      d.cells = {full_cell(1), cell};
+      return d;
+    }());
     EXPECT_THROW(canonicalise(divided), CheckFailure);
     Event woken = event_of(Moved{full_cell(1), {{CellId{2}, bad, 1.0}}});
     EXPECT_THROW(canonicalise(woken), CheckFailure);
@@ -219,8 +225,10 @@ TEST(Canonicalise, NegativeZeroBecomesZeroEverywhereAndNanOrInfinityFailsACheck)
 }
 
 TEST(EventNames, RoundTrip) {
-  for (int k = 0; k < kEventKindCount; ++k) EXPECT_EQ(event_kind_from(name_of(static_cast<EventKind>(k))), static_cast<EventKind>(k));
-  for (int r = 0; r < 8; ++r) EXPECT_EQ(finish_reason_from(name_of(static_cast<FinishReason>(r))), static_cast<FinishReason>(r));
+  for (int k = 0; k < kEventKindCount; ++k)
+    EXPECT_EQ(event_kind_from(name_of(static_cast<EventKind>(k))), static_cast<EventKind>(k));
+  for (int r = 0; r < 8; ++r)
+    EXPECT_EQ(finish_reason_from(name_of(static_cast<FinishReason>(r))), static_cast<FinishReason>(r));
   EXPECT_FALSE(event_kind_from("born"));
   EXPECT_FALSE(finish_reason_from(""));
 }
@@ -268,35 +276,35 @@ TEST_F(Apply, FoldsFactsAndCountsActivities) {
 }
 
 TEST_F(Apply, RefusesWhatDoesNotFitTheHistory) {
-  expect_refused(next(Founded{full_cell(2)}, 2));                      // ids are dense
-  expect_refused(next(Founded{full_cell(1)}, 2));                      // subject and cell differ
+  expect_refused(next(Founded{full_cell(2)}, 2));  // ids are dense
+  expect_refused(next(Founded{full_cell(1)}, 2));  // subject and cell differ
   colony_.apply(next(Founded{full_cell(1)}, 1, 5.0));
   Event event = next(Senesced{}, 1, 6.0);
   event.seq += 1;
-  expect_refused(event);                                               // a gap
+  expect_refused(event);  // a gap
   event.seq -= 2;
-  expect_refused(event);                                               // a repeat
-  expect_refused(next(Senesced{}, 1, 4.9));                            // back in time
+  expect_refused(event);                     // a repeat
+  expect_refused(next(Senesced{}, 1, 4.9));  // back in time
   event = next(Senesced{}, 1, 6.0);
   event.digest.bytes[7] ^= 1;
-  expect_refused(event);                                               // another chain
-  expect_refused(next(Senesced{}, 2, 6.0));                            // unknown subject
+  expect_refused(event);                     // another chain
+  expect_refused(next(Senesced{}, 2, 6.0));  // unknown subject
   expect_refused(next(Inhibited{}, 0, 6.0));
   event = next(Senesced{}, 1, 6.0);
   event.cell_id.reset();
   event.digest = digest_after(colony_.digest(), event);
-  expect_refused(event);                                               // no subject
-  expect_refused(next(Finished{FinishReason::kTime, 2}, 0, 6.0));      // a wrong count of cells
+  expect_refused(event);                                           // no subject
+  expect_refused(next(Finished{FinishReason::kTime, 2}, 0, 6.0));  // a wrong count of cells
   Divided divided;
   divided.cells = {full_cell(1), full_cell(2)};
   divided.cells[0].ordinal = 2;
   divided.cells[1].parent_id = CellId{1};
   Divided wrong = divided;
   wrong.cells[1].id = CellId{3};
-  expect_refused(next(wrong, 1, 6.0));                                 // the daughter's id is not the next
+  expect_refused(next(wrong, 1, 6.0));  // the daughter's id is not the next
   wrong = divided;
   wrong.cells[0].ordinal = 1;
-  expect_refused(next(wrong, 1, 6.0));                                 // the parent's ordinal did not rise
+  expect_refused(next(wrong, 1, 6.0));  // the parent's ordinal did not rise
   wrong = divided;
   wrong.cells[1].parent_id.reset();
   expect_refused(next(wrong, 1, 6.0));

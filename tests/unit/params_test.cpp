@@ -1,12 +1,13 @@
-// Validation: every row of the table refuses what lies outside it, the rules between parameters hold, all errors come at once.
+// Validation: every row of the table refuses what lies outside it, the rules between parameters hold, all errors come
+// at once.
+#include "engine/model/params.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <string>
 
 #include <gtest/gtest.h>
-
-#include "engine/model/params.hpp"
 
 namespace colony {
 namespace {
@@ -32,17 +33,21 @@ double beyond(double bound, double sign) { return bound + sign * std::max(1e-9, 
 struct Setter {
   Params& params;
   double value;
-  std::string pointer;           // where an error must point; set by the visit
+  std::string pointer;  // where an error must point; set by the visit
   bool applicable = true;
   void operator()(Access<double> access) { access(params) = value; }
-  void operator()(Access<std::int64_t> access) { whole([&](std::int64_t v) { access(params) = v; }); }
+  void operator()(Access<std::int64_t> access) {
+    whole([&](std::int64_t v) { access(params) = v; });
+  }
   void operator()(Access<bool>) { applicable = false; }
   void operator()(Access<Interval> access) {
     access(params) = {value, value};
     pointer += "/0";
   }
   void operator()(Access<std::optional<double>> access) { access(params) = value; }
-  void operator()(Access<std::optional<std::int64_t>> access) { whole([&](std::int64_t v) { access(params) = v; }); }
+  void operator()(Access<std::optional<std::int64_t>> access) {
+    whole([&](std::int64_t v) { access(params) = v; });
+  }
   void operator()(const EnumAccess&) { applicable = false; }
   void operator()(Access<std::vector<Vec2>> access) {
     access(params) = {Vec2(0.0, 0.0), Vec2(0.0, value)};
@@ -56,7 +61,8 @@ struct Setter {
 };
 
 bool is_whole(const ParamInfo& info) {
-  return std::holds_alternative<Access<std::int64_t>>(info.access) || std::holds_alternative<Access<std::optional<std::int64_t>>>(info.access);
+  return std::holds_alternative<Access<std::int64_t>>(info.access) ||
+         std::holds_alternative<Access<std::optional<std::int64_t>>>(info.access);
 }
 
 TEST(Validate, DefaultsAndPresetsAreValid) {
@@ -74,7 +80,8 @@ TEST(Validate, EveryRowRefusesBelowAboveNanAndInfinityAndPointsAtItself) {
   int asked = 0;
   for (const ParamInfo& info : param_table()) {
     const double step = is_whole(info) ? 1.0 : 0.0;
-    for (const double bad : {step > 0 ? info.min - 1 : beyond(info.min, -1), step > 0 ? info.max + 1 : beyond(info.max, 1), kNan, kInfinity, -kInfinity}) {
+    for (const double bad : {step > 0 ? info.min - 1 : beyond(info.min, -1),
+                             step > 0 ? info.max + 1 : beyond(info.max, 1), kNan, kInfinity, -kInfinity}) {
       Params params;
       Setter setter{params, bad, pointer_of(info)};
       std::visit(setter, info.access);
@@ -149,23 +156,47 @@ struct CrossRule {
 
 TEST(Validate, RulesBetweenParametersHoldAtTheirEdge) {
   const CrossRule rules[] = {
-      {"sd a quarter of the mean", "/cycle/sd_h", [](Params& p) { p.cycle.sd_h = 3.001; p.division.settle_h = 1.0; }, [](Params& p) { p.cycle.sd_h = 2.9; }},
+      {"sd a quarter of the mean", "/cycle/sd_h",
+       [](Params& p) {
+         p.cycle.sd_h = 3.001;
+         p.division.settle_h = 1.0;
+       },
+       [](Params& p) { p.cycle.sd_h = 2.9; }},
       {"half range a third of the mean", "/cycle/half_range_h", [](Params& p) { p.cycle.half_range_h = 4.001; },
        [](Params& p) { p.cycle.half_range_h = 4.0; }},
-      {"noise above 0.40 only at q <= 5", "/noise/amplitude", [](Params& p) { p.noise = {0.41, 5.01, 1.4}; },
-       [](Params& p) { p.noise = {0.45, 5.0, 1.4}; }},
-      {"noise of 0.40 at any q", "/noise/amplitude", [](Params& p) { p.noise = {0.45, 8.0, 1.4}; }, [](Params& p) { p.noise = {0.40, 8.0, 1.4}; }},
+      {"noise above 0.40 only at q <= 5", "/noise/amplitude",
+       [](Params& p) {
+         p.noise = {0.41, 5.01, 1.4};
+       },
+       [](Params& p) {
+         p.noise = {0.45, 5.0, 1.4};
+       }},
+      {"noise of 0.40 at any q", "/noise/amplitude",
+       [](Params& p) {
+         p.noise = {0.45, 8.0, 1.4};
+       },
+       [](Params& p) {
+         p.noise = {0.40, 8.0, 1.4};
+       }},
       {"fitness_good at least fitness_min", "/contact/fitness_good", [](Params& p) { p.contact.fitness_good = 0.74; },
        [](Params& p) { p.contact.fitness_good = 0.75; }},
       {"cycle longer than settling and window", "/cycle/mean_h", [](Params& p) { p.division.settle_h = 5.0; },
        [](Params& p) { p.division.settle_h = 4.99; }},
       {"the same for a uniform cycle", "/cycle/mean_h",
-       [](Params& p) { p.cycle = {CycleDistribution::kUniform, 4.0, 0.0, 1.0, 0.0}; },
-       [](Params& p) { p.cycle = {CycleDistribution::kUniform, 4.0, 0.0, 0.99, 0.0}; }},
-      {"window at most settling", "/window_h", [](Params& p) { p.division.settle_h = 0.9; }, [](Params& p) { p.division.settle_h = 1.0; }},
-      {"window at most retry", "/window_h", [](Params& p) { p.wake.retry_h = 0.9; }, [](Params& p) { p.wake.retry_h = 1.0; }},
-      {"no moves yet", "/motility/rate_per_h", [](Params& p) { p.motility.rate_per_h = 0.1; }, [](Params& p) { p.motility.rate_per_h = 0.0; }},
-      {"one layer yet", "/layers", [](Params& p) { p.layers = Layers::kMulti; }, [](Params& p) { p.layers = Layers::kMono; }},
+       [](Params& p) {
+         p.cycle = {CycleDistribution::kUniform, 4.0, 0.0, 1.0, 0.0};
+       },
+       [](Params& p) {
+         p.cycle = {CycleDistribution::kUniform, 4.0, 0.0, 0.99, 0.0};
+       }},
+      {"window at most settling", "/window_h", [](Params& p) { p.division.settle_h = 0.9; },
+       [](Params& p) { p.division.settle_h = 1.0; }},
+      {"window at most retry", "/window_h", [](Params& p) { p.wake.retry_h = 0.9; },
+       [](Params& p) { p.wake.retry_h = 1.0; }},
+      {"no moves yet", "/motility/rate_per_h", [](Params& p) { p.motility.rate_per_h = 0.1; },
+       [](Params& p) { p.motility.rate_per_h = 0.0; }},
+      {"one layer yet", "/layers", [](Params& p) { p.layers = Layers::kMulti; },
+       [](Params& p) { p.layers = Layers::kMono; }},
   };
   for (const CrossRule& rule : rules) {
     Params params;
@@ -183,12 +214,13 @@ TEST(Validate, ReportsAllViolationsAtOnceRangesAndRulesTogether) {
   params.cell.elongation = {0.5, 9.0};
   params.search.points = 100;
   params.wake.tries_max = 0;
-  params.noise.frequency = kNan;              // out of range: no echo from the rule on amplitude and frequency
-  params.contact.fitness_good = 0.1;          // a rule between parameters
+  params.noise.frequency = kNan;      // out of range: no echo from the rule on amplitude and frequency
+  params.contact.fitness_good = 0.1;  // a rule between parameters
   params.founders.positions_um = {Vec2(kNan, 2e6)};
   const auto errors = validate(params);
-  for (const char* pointer : {"/cell/elongation/0", "/cell/elongation/1", "/search/points", "/wake/tries_max", "/noise/frequency",
-                              "/contact/fitness_good", "/founders/positions_um/0/0", "/founders/positions_um/0/1"}) {
+  for (const char* pointer :
+       {"/cell/elongation/0", "/cell/elongation/1", "/search/points", "/wake/tries_max", "/noise/frequency",
+        "/contact/fitness_good", "/founders/positions_um/0/0", "/founders/positions_um/0/1"}) {
     EXPECT_TRUE(has(errors, pointer)) << pointer;
   }
   EXPECT_EQ(errors.size(), 8U);

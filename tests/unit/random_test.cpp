@@ -116,11 +116,17 @@ double fraction(std::uint32_t bits) { return bits * 0x1.0p-32; }
 
 TEST(Sobol, StartsWithTheOriginAndJoeKuosFirstPoints) {
   // The first eight of new-joe-kuo-6.21201 in three dimensions, in their Gray-code order.
-  const std::vector<std::array<double, 3>> published = {{0, 0, 0},           {0.5, 0.5, 0.5},       {0.75, 0.25, 0.25},
-                                                        {0.25, 0.75, 0.75},  {0.375, 0.375, 0.625}, {0.875, 0.875, 0.125},
-                                                        {0.625, 0.125, 0.875}, {0.125, 0.625, 0.375}};
+  const std::vector<std::array<double, 3>> published = {{0, 0, 0},
+                                                        {0.5, 0.5, 0.5},
+                                                        {0.75, 0.25, 0.25},
+                                                        {0.25, 0.75, 0.75},
+                                                        {0.375, 0.375, 0.625},
+                                                        {0.875, 0.875, 0.125},
+                                                        {0.625, 0.125, 0.875},
+                                                        {0.125, 0.625, 0.375}};
   for (std::uint32_t k = 0; k < published.size(); ++k) {
-    for (int d = 0; d < 3; ++d) EXPECT_EQ(fraction(sobol_u32(k ^ (k >> 1), d)), published[k][static_cast<std::size_t>(d)]) << k << " " << d;
+    for (int d = 0; d < 3; ++d)
+      EXPECT_EQ(fraction(sobol_u32(k ^ (k >> 1), d)), published[k][static_cast<std::size_t>(d)]) << k << " " << d;
   }
 }
 
@@ -128,7 +134,8 @@ TEST(Sobol, EqualsBoostsJoeKuoTableInAllDimensions) {
   boost::random::sobol engine(kSobolDimensions);
   for (std::uint32_t k = 1; k <= 4096; ++k) {  // Boost leaves the origin out and goes in Gray-code order
     for (int d = 0; d < kSobolDimensions; ++d) {
-      ASSERT_EQ(sobol_u32(k ^ (k >> 1), d), static_cast<std::uint32_t>(engine() >> 32)) << "point " << k << " dimension " << d;
+      ASSERT_EQ(sobol_u32(k ^ (k >> 1), d), static_cast<std::uint32_t>(engine() >> 32))
+          << "point " << k << " dimension " << d;
     }
   }
 }
@@ -137,7 +144,8 @@ TEST(Sobol, DimensionsOutsideTheTableFailACheck) {
   EXPECT_THROW(sobol_u32(1, -1), CheckFailure);
   EXPECT_THROW(sobol_u32(1, kSobolDimensions), CheckFailure);
   PointSet out;
-  for (const std::uint32_t n : {0U, 3U, 65'535U, 131'072U}) EXPECT_THROW(scrambled_sobol(n, {1, 2, 3}, out), CheckFailure) << n;
+  for (const std::uint32_t n : {0U, 3U, 65'535U, 131'072U})
+    EXPECT_THROW(scrambled_sobol(n, {1, 2, 3}, out), CheckFailure) << n;
 }
 
 RC_GTEST_PROP(OwenScrambling, KeepsElementaryIntervals, (std::uint32_t x, std::uint32_t y, std::uint32_t seed)) {
@@ -183,7 +191,8 @@ TEST(ScrambledSobol, EverySetIsANetInEachCoordinateAndStratifiedInPairsLikeTheUn
       PointSet points;
       Stream stream(14, CellId{set + 1}, 0, Purpose::kSearchPoints);
       scrambled_sobol(n, {stream.next_u32(), stream.next_u32(), stream.next_u32()}, points);
-      const std::array<std::vector<std::uint32_t>, 3> scrambled = {column(points.x), column(points.y), column(points.z)};
+      const std::array<std::vector<std::uint32_t>, 3> scrambled = {column(points.x), column(points.y),
+                                                                   column(points.z)};
       for (std::size_t d = 0; d < 3; ++d) {
         std::set<std::uint32_t> intervals;
         for (const std::uint32_t bits : scrambled[d]) intervals.insert(bits >> (32 - m));
@@ -191,7 +200,8 @@ TEST(ScrambledSobol, EverySetIsANetInEachCoordinateAndStratifiedInPairsLikeTheUn
       }
       for (const auto& [d, e] : {std::pair<std::size_t, std::size_t>{0, 1}, {0, 2}, {1, 2}}) {
         for (int a = 0; a <= m; ++a) {
-          EXPECT_EQ(occupancy(scrambled[d], scrambled[e], m, a), occupancy(plain[d], plain[e], m, a)) << d << e << " split " << a;
+          EXPECT_EQ(occupancy(scrambled[d], scrambled[e], m, a), occupancy(plain[d], plain[e], m, a))
+              << d << e << " split " << a;
           if (e == 1) {  // the first two dimensions are a (0, m, 2)-net: one point in every rectangle
             EXPECT_EQ(occupancy(plain[0], plain[1], m, a), (std::map<int, int>{{1, static_cast<int>(n)}}));
           }

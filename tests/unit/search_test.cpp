@@ -138,9 +138,12 @@ TEST(Search, GeneticSearchFindsBetterPlacesThanRandomAndSobolWithTheSameEvaluati
     against_random.push_back(g - r);
     against_sobol.push_back(g - s);
   }
-  const testing::Mean g = testing::mean_of(genetic), r = testing::mean_of(against_random), s = testing::mean_of(against_sobol);
-  std::printf("%u searches of 528 evaluations in a colony of 60: genetic %.3f +- %.3f, above random %.3f +- %.3f, above Sobol %.3f +- %.3f\n",
-              searches, g.value, g.se, r.value, r.se, s.value, s.se);
+  const testing::Mean g = testing::mean_of(genetic), r = testing::mean_of(against_random),
+                      s = testing::mean_of(against_sobol);
+  std::printf(
+      "%u searches of 528 evaluations in a colony of 60: genetic %.3f +- %.3f, above random %.3f +- %.3f, above Sobol "
+      "%.3f +- %.3f\n",
+      searches, g.value, g.se, r.value, r.se, s.value, s.se);
   EXPECT_GT(r.value, 3.0 * r.se);
   EXPECT_GT(s.value, 3.0 * s.se);
 }
@@ -195,7 +198,8 @@ TEST(Search, NeighboursKeepTheShareThatIsAsked) {
       const Box& box = colony.body(cell.id).box();
       if (cell.id == task.cell_id || (!meets(box, a.box()) && !meets(box, b.box()))) continue;
       ++asked;
-      EXPECT_GE(retained_share(colony, params.contact.rule, cell.id, task.cell_id, added, testing::points(4096, k)), 0.9 - 0.06)
+      EXPECT_GE(retained_share(colony, params.contact.rule, cell.id, task.cell_id, added, testing::points(4096, k)),
+                0.9 - 0.06)
           << "search " << k << " neighbour " << cell.id.value;  // 256 points decided, 4,096 look again
     }
   }
@@ -205,14 +209,20 @@ TEST(Search, NeighboursKeepTheShareThatIsAsked) {
 TEST(RetainedShare, IsOneAloneAndFallsUnderPressure) {
   const Colony& colony = crowded().colony();
   for (const Cell& cell : colony.cells()) {
-    const double with_all = retained_share(colony, ContactRule::kSum, cell.id, std::nullopt, {}, testing::points(1024, 1));
-    const double by_max = retained_share(colony, ContactRule::kMax, cell.id, std::nullopt, {}, testing::points(1024, 1));
+    const double with_all =
+        retained_share(colony, ContactRule::kSum, cell.id, std::nullopt, {}, testing::points(1024, 1));
+    const double by_max =
+        retained_share(colony, ContactRule::kMax, cell.id, std::nullopt, {}, testing::points(1024, 1));
     EXPECT_LE(with_all, by_max);  // `sum` takes at least what `max` takes
     EXPECT_GT(with_all, 0.0);
     EXPECT_LE(by_max, 1.0);
   }
-  const testing::Run alone = testing::run([] { RunSpec s = testing::spec_of(1, 1); return s; }());
-  EXPECT_EQ(retained_share(alone.colony(), ContactRule::kSum, CellId{1}, std::nullopt, {}, testing::points(1024, 1)), 1.0);
+  const testing::Run alone = testing::run([] {
+    RunSpec s = testing::spec_of(1, 1);
+    return s;
+  }());
+  EXPECT_EQ(retained_share(alone.colony(), ContactRule::kSum, CellId{1}, std::nullopt, {}, testing::points(1024, 1)),
+            1.0);
 }
 
 TEST(FreeShare, OfALoneCellIsTheDiscWithoutItsShadow) {
@@ -220,7 +230,8 @@ TEST(FreeShare, OfALoneCellIsTheDiscWithoutItsShadow) {
   const Cell& cell = alone.colony().cell(CellId{1});
   const Params params;
   std::vector<double> shares;
-  for (std::uint32_t ordinal = 0; ordinal < 50; ++ordinal) shares.push_back(free_share(alone.colony(), params, 1, cell, ordinal, {}));
+  for (std::uint32_t ordinal = 0; ordinal < 50; ++ordinal)
+    shares.push_back(free_share(alone.colony(), params, 1, cell, ordinal, {}));
   const Vec2 half = alone.colony().body(cell.id).footprint_half_extent_um();
   int inside = 0, total = 0;
   for (double x = -half.x(); x < half.x(); x += 0.1) {

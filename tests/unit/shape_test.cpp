@@ -1,4 +1,5 @@
-// One body: noise, rotation, the ellipsoid cut by the dish, projections and bounds, each against an independent computation.
+// One body: noise, rotation, the ellipsoid cut by the dish, projections and bounds, each against an independent
+// computation.
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -16,8 +17,8 @@ namespace {
 using testing::case_stream;
 
 TEST(Noise, NeverExceedsItsBoundAndComesNearIt) {
-  // Directed search: sin(q u) = 1 at u = (pi/2 + 2 pi k) / q; over k = 0..26 the second sine's phase takes 27 evenly spaced values,
-  // so one k brings it within pi/27 of its maximum as well.
+  // Directed search: sin(q u) = 1 at u = (pi/2 + 2 pi k) / q; over k = 0..26 the second sine's phase takes 27 evenly
+  // spaced values, so one k brings it within pi/27 of its maximum as well.
   for (const double phase : {0.0, 1.4, 3.0, 6.0}) {
     const NoiseParams p{0.40, 5.0, phase};
     double best = 0.0, best_g = -1.0;
@@ -84,7 +85,8 @@ TEST(Rotation, TurnsTheRightWay) {
   EXPECT_EQ(rotation_matrix(Vec3::Zero()), Mat3::Identity());
   for (int axis = 0; axis < 3; ++axis) {  // half a turn: the trace is -1
     const Vec3 half = maths::kPi * Vec3::Unit(axis);
-    EXPECT_LT((rotation_matrix(rotation_vector(rotation_matrix(half))) - rotation_matrix(half)).cwiseAbs().maxCoeff(), 1e-14);
+    EXPECT_LT((rotation_matrix(rotation_vector(rotation_matrix(half))) - rotation_matrix(half)).cwiseAbs().maxCoeff(),
+              1e-14);
   }
 }
 
@@ -108,7 +110,8 @@ Columns integrate_columns(const Body& body, int side) {
       const double discriminant = b * b - 4.0 * a * f0;
       if (!(discriminant > 0.0)) continue;
       const double root = std::sqrt(discriminant);
-      const double low = std::max(0.0, c.z() + (-b + root) / (2.0 * a)), high = std::max(0.0, c.z() + (-b - root) / (2.0 * a));
+      const double low = std::max(0.0, c.z() + (-b + root) / (2.0 * a)),
+                   high = std::max(0.0, c.z() + (-b - root) / (2.0 * a));
       out.volume += (high - low) * dx * dy;
       out.moment += Vec3(x * (high - low), y * (high - low), 0.5 * (high * high - low * low)) * dx * dy;
     }
@@ -145,7 +148,8 @@ TEST(DishCut, FullHalfAndEmptyBodiesAreExact) {
   // Spread on the dish, untilted: the centre at 0.55 C keeps (2 + 3d - d^3)/4 with d = 0.55.
   const Vec3 s(10.0, 8.0, 4.0);
   const BodyGeometry spread = {Vec3(0, 0, spread_height_um(s)), s, Vec3::Zero(), Vec3::Zero()};
-  EXPECT_NEAR(volume_above_dish_um3(spread) / testing::ellipsoid_volume_um3(s), (2.0 + 3.0 * 0.55 - 0.55 * 0.55 * 0.55) / 4.0, 1e-14);
+  EXPECT_NEAR(volume_above_dish_um3(spread) / testing::ellipsoid_volume_um3(s),
+              (2.0 + 3.0 * 0.55 - 0.55 * 0.55 * 0.55) / 4.0, 1e-14);
 }
 
 TEST(Footprint, IsTheVerticalProjectionOfTheSmoothEllipsoid) {
@@ -157,7 +161,8 @@ TEST(Footprint, IsTheVerticalProjectionOfTheSmoothEllipsoid) {
       const double x = body.centre_um().x() + 1.2 * half.x() * stream.uniform({-1.0, 1.0});
       const double y = body.centre_um().y() + 1.2 * half.y() * stream.uniform({-1.0, 1.0});
       const double z = body.centre_um().z();
-      const double f0 = body.smooth_field({x, y, z}), f1 = body.smooth_field({x, y, z + 1.0}), f2 = body.smooth_field({x, y, z - 1.0});
+      const double f0 = body.smooth_field({x, y, z}), f1 = body.smooth_field({x, y, z + 1.0}),
+                   f2 = body.smooth_field({x, y, z - 1.0});
       const double a = 0.5 * (f1 + f2) - f0, b = 0.5 * (f1 - f2);
       const double highest = f0 - b * b / (4.0 * a);
       if (std::abs(highest) < 1e-9) continue;  // on the rim, to rounding
@@ -187,7 +192,8 @@ RC_GTEST_PROP(BodyBox, HoldsEveryPointOfTheNoisyBodyAboveTheDish, (std::uint32_t
   const Body body(testing::any_ellipsoid(stream, 5.0), noise);
   const double reach = 1.5 * body.semiaxes_um().maxCoeff() * body.noisy_scale();
   for (int i = 0; i < 2000; ++i) {
-    const Vec3 p = body.centre_um() + reach * Vec3(stream.uniform({-1, 1}), stream.uniform({-1, 1}), stream.uniform({-1, 1}));
+    const Vec3 p =
+        body.centre_um() + reach * Vec3(stream.uniform({-1, 1}), stream.uniform({-1, 1}), stream.uniform({-1, 1}));
     const bool inside = p.z() >= 0.0 && body.field(p) >= 0.0;
     RC_ASSERT(body.contains(p) == inside);  // the shortcut by the noise bound decides nothing differently
     if (!inside) continue;

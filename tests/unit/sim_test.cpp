@@ -1,6 +1,4 @@
 // The rules of reproduction, seen in the histories that the simulator writes.
-#include "engine/sim/simulator.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -11,6 +9,7 @@
 #include "engine/base/check.hpp"
 #include "engine/growth/surroundings.hpp"
 #include "engine/model/cycle.hpp"
+#include "engine/sim/simulator.hpp"
 #include "engine/space/overlap.hpp"
 #include "tests/support/bodies.hpp"
 #include "tests/support/runs.hpp"
@@ -40,7 +39,8 @@ TEST(Rules, GenerationLimitGivesAtMostTwoToTheLimitAndEndsAllSenescent) {
       }
       EXPECT_LE(run.colony().cells().size(), most) << testing::name_of_run(spec);
       const bool all = run.colony().count(Activity::kSenescent) == run.colony().cells().size();
-      EXPECT_EQ(run.finished().reason, all ? FinishReason::kAllSenescent : FinishReason::kExhausted) << testing::name_of_run(spec);
+      EXPECT_EQ(run.finished().reason, all ? FinishReason::kAllSenescent : FinishReason::kExhausted)
+          << testing::name_of_run(spec);
       for (const Cell& cell : run.colony().cells()) {
         EXPECT_LE(cell.generation, limit);
         EXPECT_EQ(cell.activity == Activity::kSenescent, cell.generation == limit && !cell.due_h);
@@ -79,7 +79,8 @@ TEST(Rules, EveryDivisionKeepsTheConditionsOfTheModel) {
       EXPECT_EQ(own.generation, parent.generation + 1);
       EXPECT_EQ(daughter.generation, parent.generation + 1);
       EXPECT_EQ(daughter.ordinal, 0U);
-      const double v0 = testing::ellipsoid_volume_um3(own.semiaxes_um), v1 = testing::ellipsoid_volume_um3(daughter.semiaxes_um);
+      const double v0 = testing::ellipsoid_volume_um3(own.semiaxes_um),
+                   v1 = testing::ellipsoid_volume_um3(daughter.semiaxes_um);
       EXPECT_GE(v0, v1 * (1 - 1e-9));  // the larger share keeps the id
       EXPECT_GE(v1 / (v0 + v1), 0.40 - 1e-9);
       EXPECT_GE(v0 + v1, 800.0 - 1e-6);  // of the uncut ellipsoids
@@ -94,13 +95,15 @@ TEST(Rules, EveryDivisionKeepsTheConditionsOfTheModel) {
         EXPECT_GE(*cell->due_h - event.time_h, 6.0 - 1e-9);
         EXPECT_LE(*cell->due_h - event.time_h, 18.0 + 1e-9);
         EXPECT_DOUBLE_EQ(cell->centre_um.z(), 0.55 * cell->semiaxes_um.z());
-        EXPECT_EQ(cell->volume_um3, volume_above_dish_um3({cell->centre_um, cell->semiaxes_um, cell->rotation_rad, cell->noise_offset}));
+        EXPECT_EQ(cell->volume_um3,
+                  volume_above_dish_um3({cell->centre_um, cell->semiaxes_um, cell->rotation_rad, cell->noise_offset}));
       }
     } else if (const auto* inhibited = std::get_if<Inhibited>(&event.body)) {
       ++inhibitions;
       EXPECT_LT(inhibited->fitness, spec.params.contact.fitness_min);
       EXPECT_EQ(inhibited->try_count, before.cell(*event.cell_id).try_count + 1);
-      const bool room = inhibited->free_share > spec.params.wake.free_min && inhibited->try_count <= spec.params.wake.tries_max;
+      const bool room =
+          inhibited->free_share > spec.params.wake.free_min && inhibited->try_count <= spec.params.wake.tries_max;
       EXPECT_EQ(inhibited->due_h.has_value(), room);
     }
     before.apply(event);
@@ -114,7 +117,8 @@ TEST(Rules, PairVolumesAndSharesOfManyDivisionsSpanTheirRanges) {
   for (const Event& event : grown().events) {
     const auto* divided = std::get_if<Divided>(&event.body);
     if (divided == nullptr) continue;
-    const double v = testing::ellipsoid_volume_um3(divided->cells[0].semiaxes_um) + testing::ellipsoid_volume_um3(divided->cells[1].semiaxes_um);
+    const double v = testing::ellipsoid_volume_um3(divided->cells[0].semiaxes_um) +
+                     testing::ellipsoid_volume_um3(divided->cells[1].semiaxes_um);
     least = std::min(least, v);
     most = std::max(most, v);
   }
@@ -135,7 +139,8 @@ TEST(Nucleus, SettlesInsideItsDeformedCellAtTheCentreOfMass) {
     const Body& body = colony.body(id);
     const std::vector<const Body*> near = testing::neighbours_of(colony, id);
     outside += deformed_field(body, near, spec.params.contact.rule, settled->nucleus_um) >= 0.0 ? 0 : 1;
-    membrane_inside += deformed_field(body, near, spec.params.contact.rule, settled->nearest_membrane_um) >= 0.0 ? 1 : 0;
+    membrane_inside +=
+        deformed_field(body, near, spec.params.contact.rule, settled->nearest_membrane_um) >= 0.0 ? 1 : 0;
     // Midpoints of a regular lattice: nothing in common with the engine's points.
     const int side = 22;
     const Vec3 step = (body.box().high - body.box().low) / side;
@@ -155,10 +160,13 @@ TEST(Nucleus, SettlesInsideItsDeformedCellAtTheCentreOfMass) {
   ASSERT_GT(distances.size(), 100U);
   const double worst = *std::max_element(distances.begin(), distances.end());
   const testing::Mean mean = testing::mean_of(distances), ratio = testing::mean_of(volume_ratios);
-  std::printf("%zu settled nuclei: %d outside f~; distance from the lattice's centre of mass %.3f +- %.3f um, worst %.3f; volume ratio %.4f +- %.4f\n",
-              distances.size(), outside, mean.value, mean.se, worst, ratio.value, ratio.se);
+  std::printf(
+      "%zu settled nuclei: %d outside f~; distance from the lattice's centre of mass %.3f +- %.3f um, worst %.3f; "
+      "volume ratio %.4f +- %.4f\n",
+      distances.size(), outside, mean.value, mean.se, worst, ratio.value, ratio.se);
   EXPECT_EQ(membrane_inside, 0);
-  EXPECT_LE(outside, static_cast<int>(distances.size() / 50));  // a bay pressed into the middle puts the centre of mass outside
+  EXPECT_LE(outside,
+            static_cast<int>(distances.size() / 50));  // a bay pressed into the middle puts the centre of mass outside
   EXPECT_LT(mean.value, 0.1);
   EXPECT_LT(worst, 0.4);
   EXPECT_NEAR(ratio.value, 1.0, 0.005);

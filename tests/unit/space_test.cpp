@@ -1,6 +1,4 @@
 // Overlap counts against their brute-force twin, the wall, the reference form of the fitness, and the neighbour grid.
-#include "engine/space/overlap.hpp"
-
 #include <algorithm>
 #include <cmath>
 
@@ -8,6 +6,7 @@
 
 #include "engine/base/check.hpp"
 #include "engine/space/grid.hpp"
+#include "engine/space/overlap.hpp"
 #include "tests/support/bodies.hpp"
 #include "tests/support/scale.hpp"
 
@@ -24,8 +23,10 @@ struct Scene {
 // Every second scene is of cells spread on the dish, the others of any ellipsoids; every third has a wall across it.
 void make_scene(std::uint32_t number, Scene& scene) {
   Stream stream = testing::case_stream(number);
-  const NoiseParams noise = number % 5 == 0 ? testing::smooth() : number % 5 == 1 ? NoiseParams{0.45, 5.0, 6.0}
-                          : number % 5 == 2 ? NoiseParams{0.40, 8.0, 1.4} : testing::rough();
+  const NoiseParams noise = number % 5 == 0   ? testing::smooth()
+                            : number % 5 == 1 ? NoiseParams{0.45, 5.0, 6.0}
+                            : number % 5 == 2 ? NoiseParams{0.40, 8.0, 1.4}
+                                              : testing::rough();
   const double x = stream.uniform({-500.0, 500.0}), y = stream.uniform({-500.0, 500.0});
   const auto any = [&](double spread) {
     if (number % 2 == 0) return testing::spread_cell(stream, x, y, spread);
@@ -98,13 +99,15 @@ TEST(FloatNoise, AgreesWithGardnersSeriesWithin2e5) {
       const Vec3 u = 1.3 * Vec3(stream.uniform({-1, 1}), stream.uniform({-1, 1}), stream.uniform({-1, 1}));
       const auto fu = static_cast<float>(u.x()), fv = static_cast<float>(u.y()), fw = static_cast<float>(u.z());
       const Vec3 n = Vec3(fu, fv, fw) + g.noise_offset;
-      ASSERT_NEAR(kernel::noise_reference(prepared, fu, fv, fw), gardner_noise(n.x(), n.y(), n.z(), p), 2e-5) << "case " << number;
+      ASSERT_NEAR(kernel::noise_reference(prepared, fu, fv, fw), gardner_noise(n.x(), n.y(), n.z(), p), 2e-5)
+          << "case " << number;
     }
   }
 }
 
 TEST(Fitness, EqualsTheReferenceFormWithinStandardErrors) {
-  // V_i and V_ij each on their own domain, as the paper computes them; the engine's ratio of integers on one set of points.
+  // V_i and V_ij each on their own domain, as the paper computes them; the engine's ratio of integers on one set of
+  // points.
   std::vector<double> z;
   OverlapScratch scratch;
   const PointSet fine = testing::points(16'384, 7);
@@ -123,7 +126,8 @@ TEST(Fitness, EqualsTheReferenceFormWithinStandardErrors) {
     OverlapCounts counts;
     count_overlaps(body, near, std::nullopt, testing::points(4096, number), scratch, counts);
     const double p = std::min(1.0, taken / deformed_mass(body, {}, ContactRule::kSum, fine).volume_um3);
-    const double se = std::sqrt(std::max(p, 0.01) / counts.hit_count);  // of independent points: an upper bound for Sobol points
+    const double se =
+        std::sqrt(std::max(p, 0.01) / counts.hit_count);  // of independent points: an upper bound for Sobol points
     EXPECT_NEAR(counts.fitness(), reference, 4.0 * se + 0.003) << "case " << number;
     z.push_back(counts.fitness() - reference);
   }
@@ -159,10 +163,12 @@ TEST(CountOverlaps, PointCountsThatAreNoPowerOfTwoInRangeFailACheck) {
 TEST(AdmissibleDomain, IsEmptyExactlyWhereAProjectionIsAndHoldsEveryCommonPoint) {
   for (std::uint32_t number = 1; number <= 500; ++number) {
     Stream stream = testing::case_stream(number);
-    const Body a(testing::any_ellipsoid(stream, 15.0), testing::rough()), b(testing::any_ellipsoid(stream, 15.0), testing::rough());
+    const Body a(testing::any_ellipsoid(stream, 15.0), testing::rough()),
+        b(testing::any_ellipsoid(stream, 15.0), testing::rough());
     const Box domain = admissible_domain(a, b);
     bool some = true;
-    for (int i = 0; i < 3; ++i) some = some && std::max(a.box().low[i], b.box().low[i]) < std::min(a.box().high[i], b.box().high[i]);
+    for (int i = 0; i < 3; ++i)
+      some = some && std::max(a.box().low[i], b.box().low[i]) < std::min(a.box().high[i], b.box().high[i]);
     EXPECT_EQ(domain.empty(), !some) << "case " << number;
     for (int i = 0; i < 50; ++i) {
       const Vec3 p(stream.uniform({-30, 30}), stream.uniform({-30, 30}), stream.uniform({-5, 25}));

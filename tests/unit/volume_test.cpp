@@ -1,4 +1,5 @@
-// Volumes on scrambled Sobol points: error against exact volumes of balls and lenses, and its slope against plain Monte Carlo.
+// Volumes on scrambled Sobol points: error against exact volumes of balls and lenses, and its slope against plain Monte
+// Carlo.
 #include <cmath>
 #include <cstdio>
 #include <vector>
@@ -85,7 +86,8 @@ TEST(LensVolume, EqualsTheFormulaByTheReferenceFormAndByTheRatioOfCounts) {
       by_counts.push_back(static_cast<double>(counts.shared_counts[0]) / counts.hit_count);
     }
     const testing::Mean domain = testing::mean_of(by_domain), ratio = testing::mean_of(by_counts);
-    std::printf("x %.1f  exact %.5f  domain %.5f +- %.5f  ratio %.5f +- %.5f\n", x, exact, domain.value, domain.se, ratio.value, ratio.se);
+    std::printf("x %.1f  exact %.5f  domain %.5f +- %.5f  ratio %.5f +- %.5f\n", x, exact, domain.value, domain.se,
+                ratio.value, ratio.se);
     EXPECT_NEAR(domain.value, exact, 5.0 * domain.se + 1e-6) << x;
     EXPECT_NEAR(ratio.value, exact, 5.0 * ratio.se + 1e-6) << x;
     EXPECT_LE(ratio.se, 0.001);

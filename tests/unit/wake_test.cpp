@@ -16,14 +16,16 @@
 namespace colony {
 namespace {
 
-// What the model says about one division's `woken`, from the colonies before and after it and by brute force over all cells.
+// What the model says about one division's `woken`, from the colonies before and after it and by brute force over all
+// cells.
 void check_woken(const RunSpec& spec, const Colony& before, const Colony& after, const Event& event, int& woken_count) {
   const std::vector<Woken>* woken = nullptr;
   if (const auto* divided = std::get_if<Divided>(&event.body)) woken = &divided->woken;
   if (woken == nullptr) return;
   for (const Cell& cell : before.cells()) {
     const bool sleeping = cell.activity == Activity::kPassive && !cell.due_h && cell.id != *event.cell_id;
-    const auto found = std::find_if(woken->begin(), woken->end(), [&](const Woken& one) { return one.cell_id == cell.id; });
+    const auto found =
+        std::find_if(woken->begin(), woken->end(), [&](const Woken& one) { return one.cell_id == cell.id; });
     if (!sleeping) {
       EXPECT_EQ(found, woken->end()) << "seq " << event.seq;
       continue;
@@ -128,7 +130,8 @@ TEST(Founders, SeveralStandInTheDiscOutOfStepAndFreeEnough) {
     EXPECT_LE(v, 1800.0 + 1e-6);
     EXPECT_GE(cell.nucleus_radius_um, 2.5);
     EXPECT_LE(cell.nucleus_radius_um, 3.0);
-    bodies.emplace_back(BodyGeometry{cell.centre_um, cell.semiaxes_um, cell.rotation_rad, cell.noise_offset}, spec.params.noise);
+    bodies.emplace_back(BodyGeometry{cell.centre_um, cell.semiaxes_um, cell.rotation_rad, cell.noise_offset},
+                        spec.params.noise);
     std::vector<const Body*> earlier;
     for (std::size_t k = 0; k + 1 < bodies.size(); ++k) earlier.push_back(&bodies[k]);
     OverlapScratch scratch;
@@ -154,13 +157,15 @@ TEST(Founders, OneStandsAtTheOriginAndWaitsAWholeCycle) {
 TEST(Founders, PositionsAreKeptAndErrorsPointAtEachWrongOne) {
   RunSpec spec = testing::spec_of(7, 10);
   spec.params.dish.radius_um = 100.0;
-  spec.params.founders.positions_um = {Vec2(0, 0), Vec2(60, 0), Vec2(60.5, 0.5), Vec2(-50, -50), Vec2(0, 99), Vec2(300, 0)};
+  spec.params.founders.positions_um = {Vec2(0, 0),     Vec2(60, 0), Vec2(60.5, 0.5),
+                                       Vec2(-50, -50), Vec2(0, 99), Vec2(300, 0)};
   const Result<std::vector<Cell>> placed = place_founders(spec);
   ASSERT_FALSE(placed);
   EXPECT_EQ(placed.error().code, ErrorCode::kInvalid);
   std::vector<std::string> pointers;
   for (const FieldError& error : placed.error().fields) pointers.push_back(error.pointer);
-  EXPECT_EQ(pointers, (std::vector<std::string>{"/founders/positions_um/2", "/founders/positions_um/4", "/founders/positions_um/5"}));
+  EXPECT_EQ(pointers, (std::vector<std::string>{"/founders/positions_um/2", "/founders/positions_um/4",
+                                                "/founders/positions_um/5"}));
 
   spec.params.founders.positions_um = {Vec2(3.25, -7.5), Vec2(60, 0)};
   const Result<std::vector<Cell>> good = place_founders(spec);
