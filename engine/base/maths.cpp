@@ -98,8 +98,12 @@ double exp(double x) {
 double cbrt(double x) {
   CHECK(x >= -1.7976931348623157e308 && x <= 1.7976931348623157e308);
   if (x == 0.0) return 0.0;
-  const double a = x < 0.0 ? -x : x;
-  CHECK(a >= 2.2250738585072014e-308);
+  double a = x < 0.0 ? -x : x;
+  double unscale = 1.0;
+  if (a < 2.2250738585072014e-308) {  // subnormal: scale up by an exact power of eight, the root by that of two
+    a *= 18014398509481984.0;         // 2^54
+    unscale = 3.814697265625e-06;     // 2^-18
+  }
   // x = m * 8^k with m in [1, 8): Newton's iteration converges from 1.5 in six rounds; two more settle the last bits.
   const int exponent = static_cast<int>(std::bit_cast<std::uint64_t>(a) >> 52) - 1023;
   const int k = exponent >= 0 ? exponent / 3 : -((-exponent + 2) / 3);
@@ -107,7 +111,7 @@ double cbrt(double x) {
   const double m = a * power_of_two(-2 * k) * power_of_two(-k);  // two steps: 2^(-3k) alone may be subnormal
   double y = 1.5;
   for (int round = 0; round < 8; ++round) y = (2.0 * y + m / (y * y)) / 3.0;
-  const double root = y * power_of_two(k);
+  const double root = y * power_of_two(k) * unscale;
   return x < 0.0 ? -root : root;
 }
 

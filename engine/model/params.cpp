@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <initializer_list>
 
 #include "engine/base/maths.hpp"
 
@@ -85,30 +86,59 @@ class RangeCheck {
   std::vector<FieldError>& errors_;
 };
 
-void check_between_parameters(const Params& p, std::vector<FieldError>& errors) {
-  if (p.cycle.sd_h > p.cycle.mean_h / 4) errors.push_back({"/cycle/sd_h", "must be at most a quarter of mean_h"});
-  if (p.cycle.half_range_h > p.cycle.mean_h / 3) {
-    errors.push_back({"/cycle/half_range_h", "must be at most a third of mean_h"});
+// Rules between parameters. A rule is asked only where every parameter in it is inside its own range: all violations come at
+// once, and none is only the echo of another.
+class CrossCheck {
+ public:
+  CrossCheck(const Params& params, std::vector<FieldError>& errors) : p_(params), errors_(errors), own_count_(errors.size()) {}
+
+  void run() {
+    const Params& p = p_;
+    if (sound({"/cycle/sd_h", "/cycle/mean_h"}) && p.cycle.sd_h > p.cycle.mean_h / 4) {
+      errors_.push_back({"/cycle/sd_h", "must be at most a quarter of mean_h"});
+    }
+    if (sound({"/cycle/half_range_h", "/cycle/mean_h"}) && p.cycle.half_range_h > p.cycle.mean_h / 3) {
+      errors_.push_back({"/cycle/half_range_h", "must be at most a third of mean_h"});
+    }
+    if (sound({"/noise/amplitude", "/noise/frequency"}) && p.noise.amplitude > 0.40 && p.noise.frequency > 5.0) {
+      errors_.push_back({"/noise/amplitude", "must be at most 0.4 where frequency is above 5: the cell would fall to pieces"});
+    }
+    if (sound({"/contact/fitness_good", "/contact/fitness_min"}) && p.contact.fitness_good < p.contact.fitness_min) {
+      errors_.push_back({"/contact/fitness_good", "must be at least fitness_min"});
+    }
+    const double shortest_h = cycle_range_h(p).low;
+    if (sound({"/cycle", "/division/settle_h", "/window_h"}) && !(shortest_h > p.division.settle_h + p.window_h)) {
+      errors_.push_back({"/cycle/mean_h", "the shortest cycle that can be drawn, " + text_of(shortest_h) +
+                                              " h, must be longer than settle_h plus window_h, " +
+                                              text_of(p.division.settle_h + p.window_h) + " h"});
+    }
+    if (sound({"/window_h", "/division/settle_h"}) && p.window_h > p.division.settle_h) {
+      errors_.push_back({"/window_h", "must be at most division.settle_h"});
+    }
+    if (sound({"/window_h", "/wake/retry_h"}) && p.window_h > p.wake.retry_h) {
+      errors_.push_back({"/window_h", "must be at most wake.retry_h"});
+    }
+    if (sound({"/motility/rate_per_h"}) && p.motility.rate_per_h > 0) {
+      errors_.push_back({"/motility/rate_per_h", "moves are not simulated by this version; only 0 is accepted"});
+    }
+    if (sound({"/layers"}) && p.layers != Layers::kMono) errors_.push_back({"/layers", "only mono is simulated by this version"});
   }
-  if (p.noise.amplitude > 0.40 && p.noise.frequency > 5.0) {
-    errors.push_back({"/noise/amplitude", "must be at most 0.4 where frequency is above 5: the cell would fall to pieces"});
+
+ private:
+  // No range error at or below any of these pointers.
+  bool sound(std::initializer_list<std::string_view> pointers) const {
+    for (std::size_t i = 0; i < own_count_; ++i) {
+      for (const std::string_view pointer : pointers) {
+        if (std::string_view(errors_[i].pointer).substr(0, pointer.size()) == pointer) return false;
+      }
+    }
+    return true;
   }
-  if (p.contact.fitness_good < p.contact.fitness_min) {
-    errors.push_back({"/contact/fitness_good", "must be at least fitness_min"});
-  }
-  const double shortest_h = cycle_range_h(p).low;
-  if (!(shortest_h > p.division.settle_h + p.window_h)) {
-    errors.push_back({"/cycle/mean_h", "the shortest cycle that can be drawn, " + text_of(shortest_h) +
-                                           " h, must be longer than settle_h plus window_h, " +
-                                           text_of(p.division.settle_h + p.window_h) + " h"});
-  }
-  if (p.window_h > p.division.settle_h) errors.push_back({"/window_h", "must be at most division.settle_h"});
-  if (p.window_h > p.wake.retry_h) errors.push_back({"/window_h", "must be at most wake.retry_h"});
-  if (p.motility.rate_per_h > 0) {
-    errors.push_back({"/motility/rate_per_h", "moves are not simulated by this version; only 0 is accepted"});
-  }
-  if (p.layers != Layers::kMono) errors.push_back({"/layers", "only mono is simulated by this version"});
-}
+
+  const Params& p_;
+  std::vector<FieldError>& errors_;
+  const std::size_t own_count_;  // of the range errors, which come first
+};
 
 constexpr std::array<std::string_view, 2> kPresets = {"paper", "clonogenic"};
 
@@ -139,7 +169,7 @@ std::vector<FieldError> validate(const Params& params) {
   Params copy = params;  // accessors give mutable references
   std::vector<FieldError> errors;
   for (const ParamInfo& info : param_table()) std::visit(RangeCheck(info, copy, errors), info.access);
-  if (errors.empty()) check_between_parameters(params, errors);
+  CrossCheck(params, errors).run();
   return errors;
 }
 
