@@ -1,5 +1,6 @@
 // digest: the chain that names a history. digest(k) = XXH3-128(digest(k-1) bytes, canonical bytes of event k).
-// Canonical bytes: little endian, fixed order, every optional preceded by a presence byte, every list by its length (u32).
+// Canonical bytes: little endian, fixed order, every optional number preceded by a presence byte, every list by its length
+// (u32); no cell id is written as 0, which is no id.
 #pragma once
 
 #include <array>

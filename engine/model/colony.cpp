@@ -100,8 +100,8 @@ void Colony::apply(const Event& event) {
       cell.due_h = body.due_h;
     }
     void operator()(const Settled& body) const {
+      CHECK(colony.cell(*event.cell_id).settle_due_h.has_value());
       Cell& cell = subject();
-      CHECK(cell.settle_due_h.has_value());
       cell.nucleus_um = body.nucleus_um;
       cell.nearest_membrane_um = body.nearest_membrane_um;
       cell.deformed_volume_um3 = body.deformed_volume_um3;

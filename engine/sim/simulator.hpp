@@ -18,7 +18,8 @@
 
 namespace colony {
 
-/// Bounds of a run, tested after every event in serial order.
+/// Bounds of a run, tested after every event in serial order, from the last founding on (a spec with more founders than
+/// until.cells is refused before it becomes a job).
 struct Until {
   std::optional<std::uint64_t> cells;
   std::optional<double> time_h;

@@ -155,6 +155,9 @@ Result<JobSpec> decode_spec(const Json& body, const SpecLimits& limits) {
     errors.push_back(
         {"/model/founders", "must be at most " + std::to_string(limits.cells_max) + ", the limit of cells in a job"});
   }
+  if (errors.size() == before_model && spec.run.until.cells && founder_count > *spec.run.until.cells) {
+    errors.push_back({"/until/cells", "must be at least the number of founders, " + std::to_string(founder_count)});
+  }
   // Placing founders needs valid parameters and the right seed; it is the one check that can take long, so it comes
   // last.
   if (errors.empty()) {

@@ -9,10 +9,10 @@ namespace {
 
 // Preset `paper`: a colony doubles each cycle up to about 12 cells; from then on sqrt(cells) grows by 0.78 a cycle (12
 // cells at 50 h, 58 at 109 h, 292 at 262 h). Confluent cells stand at about 0.009 per um2. The generation limit g ends
-// a lone colony near (0.97 g)^2 cells, about half a cell's width a generation.
+// a lone colony near (0.80 g)^2 cells (1,030 for g = 40).
 constexpr double kCellsExponential = 12.0;
 constexpr double kRootGain = 0.78;
-constexpr double kCellsPerGeneration = 0.97;
+constexpr double kCellsPerGeneration = 0.80;
 constexpr double kDensity_per_um2 = 0.009;
 constexpr double kWallPerSearch_s = 2.0e-3;  // at the evaluations and points of preset `paper`
 constexpr double kSearchesPerCell = 3.0;
