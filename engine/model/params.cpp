@@ -165,11 +165,12 @@ std::optional<Params> preset(std::string_view name) {
   return std::nullopt;
 }
 
-std::vector<FieldError> validate(const Params& params) {
+std::vector<FieldError> validate(const Params& params, const std::vector<FieldError>& known) {
   Params copy = params;  // accessors give mutable references
-  std::vector<FieldError> errors;
+  std::vector<FieldError> errors = known;
   for (const ParamInfo& info : param_table()) std::visit(RangeCheck(info, copy, errors), info.access);
   CrossCheck(params, errors).run();
+  errors.erase(errors.begin(), errors.begin() + static_cast<std::ptrdiff_t>(known.size()));
   return errors;
 }
 

@@ -147,7 +147,8 @@ std::optional<Params> preset(std::string_view name);
 
 /// Every violation: single ranges from the table, then the rules between parameters. Empty: the parameters can be simulated.
 /// Pointers are relative to the model object, e.g. "/cycle/mean_h".
-std::vector<FieldError> validate(const Params& params);
+/// `known`: errors that a reader of the parameters found already (same pointers); what stands in for such a field accuses no other.
+std::vector<FieldError> validate(const Params& params, const std::vector<FieldError>& known = {});
 
 /// Shortest and longest cycle that can be drawn, h.
 Interval cycle_range_h(const Params& params);

@@ -9,7 +9,6 @@ namespace colony::server::api {
 namespace {
 
 constexpr std::string_view kPositions = "founders.positions_um";
-constexpr std::string_view kWindow = "window_h";
 
 // Reads one parameter; a value of the wrong type is an error and leaves the parameter as it was.
 class ReadParam {
@@ -175,13 +174,6 @@ void decode_group(std::string_view group, const Json& json, const std::string& p
   }
 }
 
-bool is_range_kept(std::string_view path, const Params& params) {
-  const ParamInfo* info = find_param(group_of(path), leaf_of(path));
-  Params copy = params;
-  const double value = std::get<Access<double>>(info->access)(copy);
-  return value >= info->min && value <= info->max;
-}
-
 }  // namespace
 
 void decode_model(const Json& model, const std::string& pointer, Params& params, std::vector<FieldError>& errors) {
@@ -194,16 +186,11 @@ void decode_model(const Json& model, const std::string& pointer, Params& params,
     }
   }
 
-  // validate() tests the rules between parameters once every single range holds. The default that stands in for a field
-  // with an error of its own must not accuse its neighbours, so one range is then broken on purpose and its error
-  // dropped.
-  Params checked = params;
-  const bool break_one = errors.size() != before && is_range_kept(kWindow, params);
-  if (break_one) checked.window_h = -1.0;
-  for (FieldError& error : validate(checked)) {
-    if (break_one && error.pointer == "/window_h") continue;
-    errors.push_back({pointer + error.pointer, std::move(error.message)});
+  std::vector<FieldError> known;  // with pointers as validate() has them, from the model object on
+  for (std::size_t i = before; i < errors.size(); ++i) {
+    known.push_back({errors[i].pointer.substr(pointer.size()), errors[i].message});
   }
+  for (FieldError& error : validate(params, known)) errors.push_back({pointer + error.pointer, std::move(error.message)});
 }
 
 Json encode_param(const ParamInfo& info, const Params& params) {

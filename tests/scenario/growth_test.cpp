@@ -161,7 +161,7 @@ TEST(Growth, IsExponentialThenLimitedByContactWithSmallPassiveCellsInTheMiddleOf
         f.volume_early_um3, f.volume_end_um3, f.searches_per_division, f.centre_distance_min_um);
   }
   const auto print = [](const char* name, const testing::Mean& mean) {
-    std::printf("%-42s %9.3f +- %.3f\n", name, mean.value, mean.se);
+    std::printf("figure: %-42s %9.3f +- %.3f (%zu seeds)\n", name, mean.value, mean.se, all_figures().size());
   };
   const testing::Mean doubling = over_seeds([](const Figures& f) { return f.doubling_h; });
   const testing::Mean speed = over_seeds([](const Figures& f) { return f.radius.slope; });
@@ -197,6 +197,38 @@ TEST(Growth, IsExponentialThenLimitedByContactWithSmallPassiveCellsInTheMiddleOf
     EXPECT_GT(f.active_share, 0.02) << "seed " << f.seed;
     EXPECT_LT(f.active_share, 0.6) << "seed " << f.seed;
   }
+}
+
+// Preset paper has no other end than the Hayflick limit: rim lineages divide nearly every cycle while the rim advances by less than a
+// cell, so the colony ends far below 2^40 cells. Reduced: a limit of 10 divisions; full: the preset's 40.
+TEST(Growth, OfALoneColonyIsEndedByTheGenerationLimit) {
+  const std::int64_t limit = testing::scaled<std::int64_t>(10, 40);
+  std::vector<double> sizes, times;
+  for (const Seed seed : {1, 2, 3}) {
+    RunSpec spec;
+    spec.seed = seed;
+    spec.params.division.generation_limit = limit;
+    Simulator simulator(spec);
+    while (simulator.step()) {
+    }
+    const Colony& colony = simulator.colony();
+    const FinishReason reason = colony.finished()->reason;
+    EXPECT_TRUE(reason == FinishReason::kExhausted || reason == FinishReason::kAllSenescent) << "seed " << seed;
+    EXPECT_EQ(colony.count(Activity::kActive), 0U) << "seed " << seed;
+    for (const Cell& cell : colony.cells()) {
+      ASSERT_LE(cell.generation, limit);
+      ASSERT_EQ(cell.activity == Activity::kSenescent && cell.generation < limit, false);
+    }
+    sizes.push_back(static_cast<double>(colony.cells().size()));
+    times.push_back(colony.time_h());
+  }
+  const testing::Mean size = testing::mean_of(sizes);
+  const testing::Mean time = testing::mean_of(times);
+  std::printf("figure: a lone colony of limit %d ends at %.0f +- %.0f cells after %.0f +- %.0f h (3 seeds)\n",
+              static_cast<int>(limit), size.value, size.se, time.value, time.se);
+  // Between no more than a rim that never widens and a colony that doubles every generation to confluence of the same radius.
+  EXPECT_GT(size.value, 0.4 * static_cast<double>(limit * limit));
+  EXPECT_LT(size.value, 1.2 * static_cast<double>(limit * limit));
 }
 
 }  // namespace
