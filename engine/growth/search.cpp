@@ -12,11 +12,9 @@ namespace {
 constexpr std::uint32_t kCorrectorLane = 1000;  // past the last generation of a predictor
 constexpr int kLowBits = 3;                     // of a gene, which the corrector flips
 
-PointSet points_for(const SearchTask& task, Purpose purpose, std::int64_t n) {
-  Stream stream(task.seed, task.cell_id, task.ordinal, purpose);
-  PointSet points;
-  scrambled_sobol(static_cast<std::uint32_t>(n), {stream.next_u32(), stream.next_u32(), stream.next_u32()}, points);
-  return points;
+PointSet points_for(const SearchTask& task, Purpose purpose, std::int64_t n, std::uint32_t lane = 0) {
+  Stream stream(task.seed, task.cell_id, task.ordinal, purpose, lane);
+  return scrambled_sobol(static_cast<std::uint32_t>(n), stream);
 }
 
 /// Scores candidate pairs of one search.
@@ -31,13 +29,24 @@ class Scorer {
     std::erase(ids_, task.cell_id);
     for (const CellId id : ids_) bodies_.push_back(&colony.body(id));
     if (params.contact.neighbour_retained_min > 0.0) {
-      retained_points_ = points_for(task, Purpose::kRetained, params.search.points);
+      retained_points_ = points_for(task, Purpose::kRetained, params.search.points, 0);
     }
   }
+
+  /// From here on neighbours are judged on fresh points too, as the winner is.
+  void refresh() {
+    if (params_.contact.neighbour_retained_min > 0.0) {
+      retained_points_ = points_for(task_, Purpose::kRetained, params_.search.points_final, 1);
+    }
+  }
+
+  /// Whether the pair scored last reaches beyond the dish's wall.
+  bool crosses_wall() const { return crosses_wall_; }
 
   double score(const Pair& pair, const PointSet& points) {
     const std::array<Body, 2> bodies = {Body(pair.bodies[0], params_.noise), Body(pair.bodies[1], params_.noise)};
     double fitness = 1.0;
+    crosses_wall_ = false;
     for (std::size_t k = 0; k < 2; ++k) {
       neighbours_.clear();
       for (const Body* other : bodies_) {
@@ -46,6 +55,7 @@ class Scorer {
       neighbours_.push_back(&bodies[1 - k]);
       count_overlaps(bodies[k], neighbours_, params_.dish.radius_um, points, scratch_, counts_);
       fitness = std::min(fitness, counts_.fitness());
+      crosses_wall_ = crosses_wall_ || counts_.outside_wall_count > 0;
     }
     if (fitness > 0.0 && params_.contact.neighbour_retained_min > 0.0 && !neighbours_keep_enough(bodies)) return 0.0;
     return fitness;
@@ -59,7 +69,10 @@ class Scorer {
       if (!meets(box, bodies[0].box()) && !meets(box, bodies[1].box())) continue;
       const double share =
           retained_share(colony_, params_.contact.rule, ids_[j], task_.cell_id, added, retained_points_);
-      if (share < params_.contact.neighbour_retained_min) return false;
+      if (share >= params_.contact.neighbour_retained_min) continue;
+      // A neighbour pressed below the minimum before refuses only pairs that press it further.
+      const double before = retained_share(colony_, params_.contact.rule, ids_[j], std::nullopt, {}, retained_points_);
+      if (share < before) return false;
     }
     return true;
   }
@@ -73,6 +86,7 @@ class Scorer {
   PointSet retained_points_;
   OverlapScratch scratch_;
   OverlapCounts counts_;
+  bool crosses_wall_ = false;
 };
 
 struct Candidate {
@@ -82,8 +96,8 @@ struct Candidate {
 
 class Search {
  public:
-  Search(const Colony& colony, const Params& params, const SearchTask& task)
-      : params_(params), task_(task), scorer_(colony, params, task),
+  Search(const Colony& colony, const Params& params, const SearchTask& task, StopFlag stop)
+      : params_(params), task_(task), stop_(stop), scorer_(colony, params, task),
         points_(points_for(task, Purpose::kSearchPoints, params.search.points)),
         population_size_(static_cast<std::size_t>(params.search.population)),
         best_{Chromosome(static_cast<int>(params.search.bits))} {}
@@ -98,7 +112,9 @@ class Search {
     SearchResult result;
     result.pair = decode(best_.chromosome, task_.frame, params_);
     result.search_fitness = best_.fitness;
+    scorer_.refresh();
     result.fitness = scorer_.score(result.pair, points_for(task_, Purpose::kFinalPoints, params_.search.points_final));
+    result.crosses_wall = scorer_.crosses_wall();
     result.evaluation_count = evaluation_count_;
     result.corrected = corrected_;
     return result;
@@ -110,6 +126,7 @@ class Search {
   bool good() const { return best_.fitness >= params_.contact.fitness_good; }
 
   void evaluate(Candidate& candidate) {
+    throw_if_stopped(stop_);
     candidate.fitness = scorer_.score(decode(candidate.chromosome, task_.frame, params_), points_);
     ++evaluation_count_;
   }
@@ -232,6 +249,7 @@ class Search {
 
   const Params& params_;
   const SearchTask& task_;
+  const StopFlag stop_;
   Scorer scorer_;
   const PointSet points_;
   const std::size_t population_size_;
@@ -242,8 +260,8 @@ class Search {
 
 }  // namespace
 
-SearchResult find_space(const Colony& colony, const Params& params, const SearchTask& task) {
-  return Search(colony, params, task).run();
+SearchResult find_space(const Colony& colony, const Params& params, const SearchTask& task, StopFlag stop) {
+  return Search(colony, params, task, stop).run();
 }
 
 double retained_share(const Colony& colony, ContactRule rule, CellId cell_id, std::optional<CellId> excluded,

@@ -12,6 +12,7 @@
 #include <optional>
 #include <span>
 
+#include "engine/base/stop.hpp"
 #include "engine/growth/chromosome.hpp"
 #include "engine/model/colony.hpp"
 #include "engine/random/sobol.hpp"
@@ -31,9 +32,11 @@ struct SearchResult {
   double search_fitness = 0.0;  // on the points of the search
   std::uint32_t evaluation_count = 0;
   bool corrected = false;
+  bool crosses_wall = false;    // the winner reaches beyond the dish (on the fresh points): nothing better was found
 };
 
-SearchResult find_space(const Colony& colony, const Params& params, const SearchTask& task);
+/// Throws Stopped when asked to (looked at before every candidate).
+SearchResult find_space(const Colony& colony, const Params& params, const SearchTask& task, StopFlag stop = nullptr);
 
 /// Share of its own volume that `cell_id` keeps beside its neighbours (without `excluded`, with `added`): hits of f~ over hits of f.
 /// 1 for a body without hits.

@@ -35,8 +35,7 @@ double free_share(const Colony& colony, const Params& params, Seed seed, const C
   for (const Body& body : change.bodies) bodies.push_back(&body);
 
   Stream stream(seed, cell.id, ordinal, Purpose::kFreeShare);
-  PointSet points;
-  scrambled_sobol(kFreeSharePoints, {stream.next_u32(), stream.next_u32(), stream.next_u32()}, points);
+  const PointSet points = scrambled_sobol(kFreeSharePoints, stream);
   std::uint32_t free_count = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const double r = radius * std::sqrt(static_cast<double>(points.x[i]));

@@ -28,8 +28,8 @@ struct Cell {
   std::optional<double> due_h;             // next division attempt; none while asleep or senescent
   std::optional<double> settle_due_h;      // none once the nucleus has settled
   std::optional<double> move_due_h;        // none without motility
-  std::optional<double> free_share;        // of the surroundings, at the last failed search
-  std::int32_t try_count = 0;              // failed searches since the last change nearby
+  std::optional<double> free_share;        // of the surroundings, at the last failed search or waking
+  std::int32_t try_count = 0;              // failed searches since it was founded, born or woken
   double volume_um3 = 0.0;                 // noise-free ellipsoid above the dish, analytic
   std::optional<double> deformed_volume_um3;    // estimate at settling
   std::optional<Vec3> nearest_membrane_um;      // m, stored at settling; the next splitting plane goes through it

@@ -6,6 +6,7 @@
 #include <initializer_list>
 
 #include "engine/base/maths.hpp"
+#include "engine/shape/body.hpp"
 
 namespace colony {
 namespace {
@@ -178,11 +179,6 @@ Interval cycle_range_h(const Params& params) {
   const CycleParams& cycle = params.cycle;
   const double half = cycle.distribution == CycleDistribution::kNormal ? 3.0 * cycle.sd_h : cycle.half_range_h;
   return {cycle.mean_h - half, cycle.mean_h + half};
-}
-
-double noise_bound(const NoiseParams& noise) {
-  // |G| <= a (1 + 1/1.17) on each axis, so the product is at most (1 + 1/1.17)^3 a^3 = 6.3796 a^3, rounded up.
-  return 6.380 * noise.amplitude * noise.amplitude * noise.amplitude;
 }
 
 namespace {

@@ -152,8 +152,6 @@ std::vector<FieldError> validate(const Params& params, const std::vector<FieldEr
 
 /// Shortest and longest cycle that can be drawn, h.
 Interval cycle_range_h(const Params& params);
-/// |noise| <= this, 6.380 a^3.
-double noise_bound(const NoiseParams& noise);
 /// Largest distance of any point of a body's bounding box from its centre along x or y, over all parameters allowed, um.
 double body_half_extent_max_um(const Params& params);
 /// Every body a division can place, noise box included, lies within this distance (per axis x, y) of the nucleus centre, um.

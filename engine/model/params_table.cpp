@@ -93,7 +93,7 @@ const std::vector<ParamInfo>& table() {
       {"wake.gain", "", 0, 1, false, "growth of the free share that wakes a sleeping cell", COLONY_FIELD(wake.gain, double)},
       {"wake.retry_h", "h", 0.01, 48, false, "time from waking to the next search; at least window_h",
        COLONY_FIELD(wake.retry_h, double)},
-      {"wake.tries_max", "", 1, 100, false, "most times a cell with room tries again without a change nearby", COLONY_FIELD(wake.tries_max, Whole)},
+      {"wake.tries_max", "", 1, 100, false, "most times a cell with room repeats a failed search before it sleeps", COLONY_FIELD(wake.tries_max, Whole)},
       {"motility.rate_per_h", "1/h", 0, 2, false, "rate of amoeboid moves; only 0 in this version",
        COLONY_FIELD(motility.rate_per_h, double)},
       {"motility.step_um", "um", 0.1, 20, false, "length of a move", COLONY_FIELD(motility.step_um, double)},

@@ -79,7 +79,7 @@ Result<Frame> frame_of(const Extent& extent, const PictureSpec& spec) {
 }  // namespace
 
 // The contact rule cannot change what is seen from above (top_view.hpp), so nothing of the parameters is read.
-Result<Picture> render(const Colony& colony, const Params&, const PictureSpec& spec) {
+Result<Picture> render(const Colony& colony, const Params&, const PictureSpec& spec, StopFlag stop) {
   const Result<Frame> framed = frame_of(extent_of(colony), spec);
   if (!framed) return framed.error();
   const Frame& frame = *framed;
@@ -95,6 +95,7 @@ Result<Picture> render(const Colony& colony, const Params&, const PictureSpec& s
   const bool shaded = spec.style == PictureStyle::kShaded;
   const CellColours colours = shaded ? colour_cells(colony, spec.colour_by) : CellColours{};
   for (std::int64_t row = 0; row < frame.height_px; row += kStripRows_px) {
+    throw_if_stopped(stop);
     const RowRange rows{row, std::min(row + kStripRows_px, frame.height_px)};
     const RowRange read{std::max<std::int64_t>(0, rows.first - kStyleHalo_px),
                         std::min(rows.end + kStyleHalo_px, frame.height_px)};

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "engine/base/result.hpp"
+#include "engine/base/stop.hpp"
 #include "engine/model/colony.hpp"
 
 namespace colony {
@@ -39,7 +40,8 @@ struct Picture {
 
 /// Errors (kInvalid/kLimit, pointer = the query parameter): a scale that makes a side longer than kPictureSideMax_px.
 /// A colony without cells gives an empty background of 100 um.
-Result<Picture> render(const Colony& colony, const Params& params, const PictureSpec& spec);
+/// Throws Stopped when asked to.
+Result<Picture> render(const Colony& colony, const Params& params, const PictureSpec& spec, StopFlag stop = nullptr);
 
 /// PNG bytes of a picture, with its physical pixel size (pHYs).
 std::string encode_png(const Picture& picture);

@@ -122,4 +122,11 @@ void scrambled_sobol(std::uint32_t n, const std::array<std::uint32_t, 3>& seeds,
   }
 }
 
+PointSet scrambled_sobol(std::uint32_t n, Stream& stream) {
+  const std::array<std::uint32_t, 3> seeds = {stream.next_u32(), stream.next_u32(), stream.next_u32()};
+  PointSet points;
+  scrambled_sobol(n, seeds, points);
+  return points;
+}
+
 }  // namespace colony

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "engine/base/types.hpp"
+#include "engine/random/stream.hpp"
 
 namespace colony {
 
@@ -33,5 +34,8 @@ struct PointSet {
 
 /// Unscrambled in 32 bits, computed once for the largest n and shared; scrambled into `out` (resized to n).
 void scrambled_sobol(std::uint32_t n, const std::array<std::uint32_t, 3>& seeds, PointSet& out);
+
+/// The same with the next three words of `stream` as seeds.
+PointSet scrambled_sobol(std::uint32_t n, Stream& stream);
 
 }  // namespace colony

@@ -26,7 +26,7 @@ enum class Purpose : std::uint8_t {
   kSettlePoints = 10,    // lane 0: centre of mass, 1: nearest membrane
   kFreeShare = 11,       // scrambling of the disc
   kRetry = 12,           // next cycle after an unlucky search
-  kRetained = 13,        // scrambling: a neighbour's retained share; lane = 0
+  kRetained = 13,        // scrambling: a neighbour's retained share; lane 0: in the search, 1: of the winner
 };
 
 class Stream {

@@ -75,6 +75,11 @@ double gardner_noise(double u, double v, double w, const NoiseParams& p) {
   return gx * gy * gz;
 }
 
+double noise_bound(const NoiseParams& noise) {
+  // |G| <= a (1 + 1/1.17) on each axis, so the product is at most (1 + 1/1.17)^3 a^3 = 6.3796 a^3, rounded up.
+  return 6.380 * noise.amplitude * noise.amplitude * noise.amplitude;
+}
+
 double noise_period(const NoiseParams& params) { return 54.0 * maths::kPi / params.frequency; }
 
 Body::Body(const BodyGeometry& geometry, const NoiseParams& noise)

@@ -79,6 +79,9 @@ class Body {
   double footprint_xx_ = 1.0, footprint_xy_ = 0.0, footprint_yy_ = 1.0;  // inverse of the shadow's 2x2 form
 };
 
+/// |noise| <= this, 6.380 a^3.
+double noise_bound(const NoiseParams& noise);
+
 /// True if a plane across the line of centres separates the two noisy bodies: then they share no point. (False proves nothing.)
 bool separated(const Body& a, const Body& b);
 

@@ -17,9 +17,7 @@ namespace {
 
 PointSet points_for(Seed seed, const Cell& cell, Purpose purpose, std::uint32_t lane, std::uint32_t n) {
   Stream stream(seed, cell.id, cell.ordinal, purpose, lane);
-  PointSet points;
-  scrambled_sobol(n, {stream.next_u32(), stream.next_u32(), stream.next_u32()}, points);
-  return points;
+  return scrambled_sobol(n, stream);
 }
 
 std::vector<const Body*> neighbours_of(const Colony& colony, CellId id) {
@@ -99,7 +97,7 @@ Inhibited inhibited(const Colony& colony, const Params& params, Seed seed, const
 
 }  // namespace
 
-EventBody decide_division(const Colony& colony, const Params& params, Seed seed, CellId id, double time_h) {
+EventBody decide_division(const Colony& colony, const Params& params, Seed seed, CellId id, double time_h, StopFlag stop) {
   const Cell& parent = colony.cell(id);
   if (params.division.generation_limit && parent.generation >= *params.division.generation_limit) return Senesced{};
 
@@ -112,8 +110,9 @@ EventBody decide_division(const Colony& colony, const Params& params, Seed seed,
   for (std::uint32_t lane = 0; lane < 2; ++lane) {
     task.frame.noise_offsets[lane] = draw_noise_offset(params, seed, parent, lane);
   }
-  const SearchResult found = find_space(colony, params, task);
-  if (params.division.inhibition && !(found.fitness >= params.contact.fitness_min)) {
+  const SearchResult found = find_space(colony, params, task, stop);
+  // The dish's wall is hard also where inhibition is off.
+  if (found.crosses_wall || (params.division.inhibition && !(found.fitness >= params.contact.fitness_min))) {
     return inhibited(colony, params, seed, parent, time_h, found);
   }
 

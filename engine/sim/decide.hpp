@@ -6,6 +6,7 @@
 // Source:  the paper, section 4; readings in engine/DESIGN.md.
 #pragma once
 
+#include "engine/base/stop.hpp"
 #include "engine/model/colony.hpp"
 #include "engine/model/event.hpp"
 #include "engine/model/params.hpp"
@@ -14,7 +15,9 @@
 namespace colony {
 
 /// The body of the event for a division attempt of `id` at `time_h`: Divided, Inhibited or Senesced.
-EventBody decide_division(const Colony& colony, const Params& params, Seed seed, CellId id, double time_h);
+/// Throws Stopped when asked to.
+EventBody decide_division(const Colony& colony, const Params& params, Seed seed, CellId id, double time_h,
+                          StopFlag stop = nullptr);
 
 /// The nucleus of `id` comes to rest: Settled.
 EventBody decide_settling(const Colony& colony, const Params& params, Seed seed, CellId id);

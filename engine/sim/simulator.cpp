@@ -3,21 +3,26 @@
 #include <utility>
 
 #include "engine/base/check.hpp"
+#include "engine/base/float_mode.hpp"
 #include "engine/sim/decide.hpp"
 
 namespace colony {
 namespace {
 
-std::vector<Cell> founders_of(const RunSpec& spec) {
+RunSpec checked(RunSpec spec) {
   CHECK(validate(spec.params).empty());
-  Result<std::vector<Cell>> cells = place_founders(spec);
-  CHECK(bool(cells));
-  return std::move(*cells);
+  return spec;
 }
 
 }  // namespace
 
-Simulator::Simulator(RunSpec spec) : spec_(std::move(spec)), founders_(founders_of(spec_)), colony_(spec_.params) {}
+Simulator::Simulator(RunSpec spec, StopFlag stop)
+    : spec_(checked(std::move(spec))),
+      stop_(stop),
+      founder_count_(colony::founder_count(spec_.params.founders)),
+      colony_(spec_.params) {
+  check_floating_point_mode();
+}
 
 void Simulator::replay(const Event& stored) {
   colony_.apply(stored);
@@ -55,8 +60,14 @@ std::optional<FinishReason> Simulator::reason_to_finish() const {
 
 std::optional<Event> Simulator::step() {
   if (colony_.finished()) return std::nullopt;
+  throw_if_stopped(stop_);
   const std::size_t founded = colony_.last_seq();
-  if (founded < founders_.size()) {
+  if (founded < founder_count_) {
+    if (founders_.empty()) {
+      Result<std::vector<Cell>> placed = place_founders(spec_, stop_);
+      CHECK(bool(placed));  // tried before the spec became a job
+      founders_ = std::move(*placed);
+    }
     Event event;
     event.cell_id = founders_[founded].id;
     event.body = Founded{founders_[founded]};
@@ -68,7 +79,7 @@ std::optional<Event> Simulator::step() {
     window_ = agenda_.due_before(agenda_.first().due_h + spec_.params.window_h);
     next_ = 0;
   }
-  const AgendaItem item = window_[next_++];
+  const AgendaItem item = window_[next_];
   // Nothing that happens inside a window makes anything due inside it: every delay is at least as long as the window. So the
   // window, fixed when it began, is the serial order whatever its length.
   CHECK(item == agenda_.first());
@@ -77,9 +88,12 @@ std::optional<Event> Simulator::step() {
   event.cell_id = item.cell_id;
   switch (item.kind) {
     case DueKind::kSettle: event.body = decide_settling(colony_, spec_.params, spec_.seed, item.cell_id); break;
-    case DueKind::kDivide: event.body = decide_division(colony_, spec_.params, spec_.seed, item.cell_id, item.due_h); break;
+    case DueKind::kDivide:
+      event.body = decide_division(colony_, spec_.params, spec_.seed, item.cell_id, item.due_h, stop_);
+      break;
     case DueKind::kMove: CHECK(false && "moves are refused by validate()"); break;
   }
+  ++next_;  // only now: a stopped decision is made again
   return commit(std::move(event));
 }
 

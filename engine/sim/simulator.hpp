@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "engine/base/result.hpp"
+#include "engine/base/stop.hpp"
 #include "engine/model/colony.hpp"
 #include "engine/model/event.hpp"
 #include "engine/model/params.hpp"
@@ -34,13 +35,19 @@ struct RunSpec {
 
 /// The founding cells, ids 1..n, ready for `founded` events. Errors (kInvalid) point into the model object:
 /// "/founders/positions_um/3" for a founder that overlaps an earlier one beyond tolerance or lies outside the dish,
-/// "/founders" when 1,000 tries found no place. Pure: the same spec gives the same cells.
-Result<std::vector<Cell>> place_founders(const RunSpec& spec);
+/// "/founders" when 1,000 tries for one of them, or kFounderTriesMax for all, found no place. Pure: the same spec gives the same
+/// cells. Long for many thousands: throws Stopped when asked to.
+Result<std::vector<Cell>> place_founders(const RunSpec& spec, StopFlag stop = nullptr);
+inline constexpr std::uint64_t kFounderTriesMax = 400'000;
+
+/// How many cells found the colony: of positions_um, else count.
+std::uint64_t founder_count(const FounderParams& founders);
 
 class Simulator {
  public:
-  /// The spec must be valid (validate() empty); founders are placed here and CHECKed.
-  explicit Simulator(RunSpec spec);
+  /// The spec must be valid (validate() empty, CHECKed). Founders are placed when the first of them is needed, so that replaying
+  /// a stored history costs no placement. While `stop` is set, step() throws Stopped and changes nothing.
+  explicit Simulator(RunSpec spec, StopFlag stop = nullptr);
 
   /// Folds one stored event; nothing is decided. Events must come in order, from seq 1.
   void replay(const Event& stored);
@@ -60,7 +67,9 @@ class Simulator {
   Event commit(Event event);
 
   const RunSpec spec_;                       // fixed after construction
-  std::vector<Cell> founders_;               // fixed after construction
+  const StopFlag stop_;
+  const std::uint64_t founder_count_;
+  std::vector<Cell> founders_;               // placed at the first founding; empty before
   Colony colony_;
   Agenda agenda_;
   std::vector<AgendaItem> window_;           // due inside the current window, in serial order; next_ is the first unhandled
