@@ -16,9 +16,7 @@ std::optional<Vec3> nearest_membrane_um(const Body& body, std::span<const Body* 
   std::optional<Vec3> nearest;
   double least = 0.0;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const Vec3 p(slab.low.x() + static_cast<double>(points.x[i]) * (slab.high.x() - slab.low.x()),
-                 slab.low.y() + static_cast<double>(points.y[i]) * (slab.high.y() - slab.low.y()),
-                 slab.low.z() + static_cast<double>(points.z[i]) * (slab.high.z() - slab.low.z()));
+    const Vec3 p = placed_um(slab, points, i);
     const double distance2 = (p - nucleus_um).squaredNorm();
     if (nearest && !(distance2 < least)) continue;  // cannot win: no need to know the sign of f~
     if (deformed_contains(body, neighbours, rule, p)) continue;

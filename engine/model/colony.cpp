@@ -5,11 +5,8 @@
 #include "engine/base/check.hpp"
 
 namespace colony {
-namespace {
 
 BodyGeometry geometry_of(const Cell& cell) { return {cell.centre_um, cell.semiaxes_um, cell.rotation_rad, cell.noise_offset}; }
-
-}  // namespace
 
 Colony::Colony(const Params& params) : noise_(params.noise), grid_(body_half_extent_max_um(params)) {}
 

@@ -17,6 +17,9 @@
 
 namespace colony {
 
+/// The geometry of a cell's body.
+BodyGeometry geometry_of(const Cell& cell);
+
 class Colony {
  public:
   /// Only what decides shapes and the grid's pitch is taken from `params`.

@@ -191,7 +191,7 @@ Vec3 centroid_above_dish_um(const BodyGeometry& geometry) {
   return geometry.centre_um + (0.75 * one_minus * one_minus / below) * cut.top_um;
 }
 
-double deformed_field(const Body& body, std::span<const Body* const> neighbours, ContactRule rule, const Vec3& point_um) {
+double taken_by(std::span<const Body* const> neighbours, ContactRule rule, const Vec3& point_um) {
   double taken = 0.0;
   for (const Body* other : neighbours) {
     if (!(other->smooth_field(point_um) >= -other->noise_bound())) continue;  // f_j < 0: takes nothing
@@ -199,7 +199,11 @@ double deformed_field(const Body& body, std::span<const Body* const> neighbours,
     if (!(f > 0.0)) continue;
     taken = rule == ContactRule::kSum ? taken + f : std::max(taken, f);
   }
-  return body.field(point_um) - taken;
+  return taken;
+}
+
+double deformed_field(const Body& body, std::span<const Body* const> neighbours, ContactRule rule, const Vec3& point_um) {
+  return body.field(point_um) - taken_by(neighbours, rule, point_um);
 }
 
 }  // namespace colony

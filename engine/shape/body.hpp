@@ -95,6 +95,9 @@ double volume_above_dish_um3(const BodyGeometry& geometry);
 /// Its centroid, um, analytic: where the nucleus of a new cell stands.
 Vec3 centroid_above_dish_um(const BodyGeometry& geometry);
 
+/// What the neighbours take at p: the sum of max(0, f_j), or the largest. Evaluates the noise only where f_j can be positive.
+double taken_by(std::span<const Body* const> neighbours, ContactRule rule, const Vec3& point_um);
+
 /// f~ at p: f minus what the neighbours take there. `rule` kSum: sum over max(0, f_j), the paper's; kMax: the largest only.
 double deformed_field(const Body& body, std::span<const Body* const> neighbours, ContactRule rule, const Vec3& point_um);
 

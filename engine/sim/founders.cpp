@@ -84,13 +84,9 @@ class FounderPlacer {
 
   void stand_at(Cell& cell, const Vec2& position) const {
     cell.centre_um = Vec3(position.x(), position.y(), spread_height_um(cell.semiaxes_um));
-    const BodyGeometry body = geometry(cell);
+    const BodyGeometry body = geometry_of(cell);
     cell.nucleus_um = centroid_above_dish_um(body);
     cell.volume_um3 = volume_above_dish_um3(body);
-  }
-
-  static BodyGeometry geometry(const Cell& cell) {
-    return {cell.centre_um, cell.semiaxes_um, cell.rotation_rad, cell.noise_offset};
   }
 
   std::optional<std::string> problem_at(Cell& cell, const Vec2& position) {
@@ -117,7 +113,7 @@ class FounderPlacer {
   }
 
   OverlapCounts overlaps(const Cell& cell) {
-    const Body body(geometry(cell), params_.noise);
+    const Body body(geometry_of(cell), params_.noise);
     colony_.cells_meeting(body.box(), ids_);
     std::vector<const Body*> neighbours;
     for (const CellId id : ids_) neighbours.push_back(&colony_.body(id));

@@ -49,13 +49,13 @@ bool beyond_wall(const Placement& placement, double wall_radius_um, float x, flo
   return px * px + py * py > wall_radius_um * wall_radius_um;
 }
 
-Vec3 position(const Box& box, const PointSet& points, std::size_t i) {
+}  // namespace
+
+Vec3 placed_um(const Box& box, const PointSet& points, std::size_t i) {
   return {box.low.x() + static_cast<double>(points.x[i]) * (box.high.x() - box.low.x()),
           box.low.y() + static_cast<double>(points.y[i]) * (box.high.y() - box.low.y()),
           box.low.z() + static_cast<double>(points.z[i]) * (box.high.z() - box.low.z())};
 }
-
-}  // namespace
 
 double OverlapCounts::fitness() const {
   if (hit_count == 0 || outside_wall_count > 0) return 0.0;
@@ -129,7 +129,7 @@ double interpenetration_volume_um3(const Body& a, const Body& b, const PointSet&
   if (domain.empty()) return 0.0;
   std::uint32_t hits = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const Vec3 p = position(domain, points, i);
+    const Vec3 p = placed_um(domain, points, i);
     if (a.contains(p) && b.contains(p)) ++hits;
   }
   return domain.volume() * hits / static_cast<double>(points.size());
@@ -140,7 +140,7 @@ bool touches(const Body& a, const Body& b, const PointSet& points) {
   const Box domain = admissible_domain(a, b);
   if (domain.empty()) return false;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const Vec3 p = position(domain, points, i);
+    const Vec3 p = placed_um(domain, points, i);
     if (a.contains(p) && b.contains(p)) return true;
   }
   return false;
@@ -148,13 +148,7 @@ bool touches(const Body& a, const Body& b, const PointSet& points) {
 
 bool deformed_contains(const Body& body, std::span<const Body* const> neighbours, ContactRule rule, const Vec3& point_um) {
   if (!body.contains(point_um)) return false;
-  double taken = 0.0;
-  for (const Body* other : neighbours) {
-    if (!(other->smooth_field(point_um) >= -other->noise_bound())) continue;
-    const double f = other->field(point_um);
-    if (!(f > 0.0)) continue;
-    taken = rule == ContactRule::kSum ? taken + f : std::max(taken, f);
-  }
+  const double taken = taken_by(neighbours, rule, point_um);
   return taken == 0.0 || body.field(point_um) - taken >= 0.0;
 }
 
@@ -165,7 +159,7 @@ MassEstimate deformed_mass(const Body& body, std::span<const Body* const> neighb
   if (body.box().empty()) return mass;
   Vec3 sum = Vec3::Zero();  // in index order: the sum's bits depend on it
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const Vec3 p = position(body.box(), points, i);
+    const Vec3 p = placed_um(body.box(), points, i);
     if (!deformed_contains(body, neighbours, rule, p)) continue;
     ++mass.hit_count;
     sum += p - body.centre_um();

@@ -19,6 +19,9 @@
 
 namespace colony {
 
+/// Point `i` of the unit cube's `points`, placed in `box`, um, double precision.
+Vec3 placed_um(const Box& box, const PointSet& points, std::size_t i);
+
 /// Integers from which fitness is made.
 struct OverlapCounts {
   std::uint32_t point_count = 0;

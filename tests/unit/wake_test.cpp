@@ -182,13 +182,13 @@ TEST(Founders, TooManyForTheirDiscAreAnErrorThatNamesTheFirstWithoutPlace) {
   ASSERT_EQ(placed.error().fields.size(), 1U);
   EXPECT_EQ(placed.error().fields[0].pointer, "/founders");
   EXPECT_NE(placed.error().fields[0].message.find("1,000 tries"), std::string::npos);
-  EXPECT_THROW(Simulator{spec}, CheckFailure);
+  EXPECT_THROW(Simulator{spec}.step(), CheckFailure);
 }
 
 TEST(Founders, InvalidParametersNeverReachTheSimulator) {
   RunSpec spec = testing::spec_of(1, 10);
   spec.params.noise.amplitude = 0.46;
-  EXPECT_THROW(Simulator{spec}, CheckFailure);
+  EXPECT_THROW(Simulator{spec}.step(), CheckFailure);
 }
 
 }  // namespace
