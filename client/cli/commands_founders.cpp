@@ -15,6 +15,7 @@ namespace {
 
 constexpr std::size_t kTableBytesMax = 1u << 30;
 constexpr const char* kDishAuto = "auto";
+constexpr const char* kDishPreset = "preset";
 constexpr double kDishMargin_um = 100.0;  // room for a founder's body and its descendants at the rim
 
 struct FounderFlags {
@@ -27,6 +28,11 @@ double positive_option(const std::string& option, const std::string& text) {
   const double value = number_option(option, text);
   if (value <= 0) throw Failure(ExitCode::kUsage, option + ": must be greater than 0, not " + text);
   return value;
+}
+
+std::string dish_of(const FounderFlags& flags) {
+  if (!flags.dish_radius.empty()) return flags.dish_radius;
+  return flags.preset == "clonogenic" ? kDishAuto : kDishPreset;
 }
 
 FounderOptions options_of(const FounderFlags& flags) {
@@ -45,8 +51,9 @@ FounderOptions options_of(const FounderFlags& flags) {
   options.y_up = flags.y_axis == "up";
   options.min_distance_um = number_option("--min-distance-um", flags.min_distance);
   if (options.min_distance_um < 0) throw Failure(ExitCode::kUsage, "--min-distance-um: must not be negative");
-  if (!flags.dish_radius.empty() && flags.dish_radius != kDishAuto) {
-    options.dish_radius_um = positive_option("--dish-radius-um", flags.dish_radius);
+  const std::string dish = dish_of(flags);
+  if (dish != kDishAuto && dish != kDishPreset) {
+    options.dish_radius_um = positive_option("--dish-radius-um", dish);
   }
   return options;
 }
@@ -68,7 +75,7 @@ ExitCode make_spec(Session& session, const FounderFlags& flags) {
   char delimiter = guess_delimiter(text);
   if (!flags.delimiter.empty()) delimiter = flags.delimiter == "tab" ? '\t' : flags.delimiter[0];
   const Founders founders = select_founders(parse_csv(text, file, delimiter), options);
-  if (flags.dish_radius == kDishAuto) options.dish_radius_um = dish_around(founders.kept);
+  if (dish_of(flags) == kDishAuto) options.dish_radius_um = dish_around(founders.kept);
 
   Json spec;
   spec["name"] = flags.name.empty() ? "founders of " + file : flags.name;
@@ -117,7 +124,8 @@ void add_founders_command(CLI::App& app, Session& session, Action& action) {
       ->capture_default_str();
   command->add_option(
       "--dish-radius-um", flags->dish_radius,
-      "Wall of the dish around the origin, or auto: just beyond the farthest founder (default: as the preset has it)");
+      "Wall of the dish around the origin: a radius, auto (just beyond the farthest founder) or preset (default: auto for preset "
+      "clonogenic, whose wall real colonies may cross, else preset)");
   command->add_option("--delimiter", flags->delimiter, "Between fields: , ; or tab (default: found in the header)")
       ->check(CLI::IsMember({",", ";", "tab"}));
   command->add_option("-o,--output", flags->output, "File for the spec (default: standard output)");

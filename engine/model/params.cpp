@@ -87,6 +87,13 @@ class RangeCheck {
   std::vector<FieldError>& errors_;
 };
 
+/// The shorter horizontal semiaxis of the smallest cell that a division can make.
+double smallest_semiaxis_um(const Params& p) {
+  const double volume = p.cell.pair_volume_um3.low * p.cell.smaller_share.low;
+  const double mean = maths::cbrt(3.0 * volume / (4.0 * maths::kPi * p.cell.flatness.high));
+  return mean / std::sqrt(p.cell.elongation.high);
+}
+
 // Rules between parameters. A rule is asked only where every parameter in it is inside its own range: all violations come at
 // once, and none is only the echo of another.
 class CrossCheck {
@@ -95,10 +102,11 @@ class CrossCheck {
 
   void run() {
     const Params& p = p_;
-    if (sound({"/cycle/sd_h", "/cycle/mean_h"}) && p.cycle.sd_h > p.cycle.mean_h / 4) {
+    const bool normal = p.cycle.distribution == CycleDistribution::kNormal;  // each rule only where its number is used
+    if (normal && sound({"/cycle/sd_h", "/cycle/mean_h"}) && p.cycle.sd_h > p.cycle.mean_h / 4) {
       errors_.push_back({"/cycle/sd_h", "must be at most a quarter of mean_h"});
     }
-    if (sound({"/cycle/half_range_h", "/cycle/mean_h"}) && p.cycle.half_range_h > p.cycle.mean_h / 3) {
+    if (!normal && sound({"/cycle/half_range_h", "/cycle/mean_h"}) && p.cycle.half_range_h > p.cycle.mean_h / 3) {
       errors_.push_back({"/cycle/half_range_h", "must be at most a third of mean_h"});
     }
     if (sound({"/noise/amplitude", "/noise/frequency"}) && p.noise.amplitude > 0.40 && p.noise.frequency > 5.0) {
@@ -118,6 +126,10 @@ class CrossCheck {
     }
     if (sound({"/window_h", "/wake/retry_h"}) && p.window_h > p.wake.retry_h) {
       errors_.push_back({"/window_h", "must be at most wake.retry_h"});
+    }
+    if (sound({"/cell"}) && p.cell.nucleus_radius_um.high > smallest_semiaxis_um(p)) {
+      errors_.push_back({"/cell/nucleus_radius_um", "the largest nucleus must fit the smallest cell, whose shorter horizontal semiaxis is " +
+                                                        text_of(smallest_semiaxis_um(p)) + " um"});
     }
     if (sound({"/motility/rate_per_h"}) && p.motility.rate_per_h > 0) {
       errors_.push_back({"/motility/rate_per_h", "moves are not simulated by this version; only 0 is accepted"});

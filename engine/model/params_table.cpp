@@ -51,7 +51,7 @@ const std::vector<ParamInfo>& table() {
       {"cell.elongation", "", 1, 3, false, "ratio of the horizontal semiaxes A/B", COLONY_FIELD(cell.elongation, Interval)},
       {"cell.flatness", "", 0.2, 1, false, "vertical semiaxis over the mean horizontal one, C/sqrt(AB)",
        COLONY_FIELD(cell.flatness, Interval)},
-      {"cell.nucleus_radius_um", "um", 1, 7, false, "horizontal radius of the nucleus; drawn for a founder, inherited",
+      {"cell.nucleus_radius_um", "um", 1, 7, false, "horizontal radius of the nucleus, which must fit the smallest cell; drawn for a founder, inherited",
        COLONY_FIELD(cell.nucleus_radius_um, Interval)},
       {"noise.amplitude", "", 0, 0.45, false, "amplitude a of Gardner's noise; at most 0.40 where frequency is above 5",
        COLONY_FIELD(noise.amplitude, double)},

@@ -273,8 +273,8 @@ TEST_F(Cli, SeriesForPeople) {
 
 TEST_F(Cli, FoundersMakeASpec) {
   write_file("t.csv", "track;time;Y;X\r\n1;0;10;20\r\n2;0;30;60\r\n");
-  EXPECT_EQ(run({"founders", path("t.csv"), "--um-per-px", "2", "--until-time", "42", "--seed", "5", "--dish-radius-um",
-                 "auto", "-o", path("spec.json")}),
+  EXPECT_EQ(run({"founders", path("t.csv"), "--um-per-px", "2", "--until-time", "42", "--seed", "5", "-o",
+                 path("spec.json")}),
             0);
   const auto spec = nlohmann::json::parse(read_file("spec.json"));
   EXPECT_EQ(spec["preset"], "clonogenic");
@@ -282,6 +282,10 @@ TEST_F(Cli, FoundersMakeASpec) {
   EXPECT_EQ(spec["model"]["dish"]["radius_um"], 200);
   EXPECT_EQ(spec["model"]["founders"]["positions_um"], nlohmann::json::parse("[[-40,20],[40,-20]]"));
   EXPECT_THAT(err(), HasSubstr("2 founders"));
+  EXPECT_EQ(run({"founders", path("t.csv"), "--um-per-px", "2", "--until-time", "42", "--seed", "5", "--dish-radius-um",
+                 "preset", "-o", path("preset.json")}),
+            0);
+  EXPECT_FALSE(nlohmann::json::parse(read_file("preset.json"))["model"].contains("dish"));
   EXPECT_THAT(err(), HasSubstr("starts here as one cell"));
   EXPECT_EQ(run({"founders", path("t.csv"), "--um-per-px", "0", "--until-time", "42", "--seed", "5"}), 2);
   EXPECT_THAT(err(), HasSubstr("--um-per-px: must be greater than 0"));
