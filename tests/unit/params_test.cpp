@@ -178,10 +178,10 @@ TEST(Validate, RulesBetweenParametersHoldAtTheirEdge) {
          p.cycle.mean_h = 100.0;
        },
        [](Params& p) { p.cycle.half_range_h = 50.0; }},
-      // 320 um3 at flatness 0.6 and elongation 1.7: cbrt(3 320 / (4 pi 0.6)) / sqrt(1.7) = 3.862 um.
+      // 320 um3 at flatness 0.6 and elongation 1.7: cbrt(3 320 / (4 pi 0.6)) / sqrt(1.7) = 3.8586 um.
       {"the nucleus fits the smallest cell", "/cell/nucleus_radius_um",
-       [](Params& p) { p.cell.nucleus_radius_um = {2.5, 3.87}; },
-       [](Params& p) { p.cell.nucleus_radius_um = {2.5, 3.86}; }},
+       [](Params& p) { p.cell.nucleus_radius_um = {2.5, 3.859}; },
+       [](Params& p) { p.cell.nucleus_radius_um = {2.5, 3.858}; }},
       {"noise above 0.40 only at q <= 5", "/noise/amplitude",
        [](Params& p) {
          p.noise = {0.41, 5.01, 1.4};
