@@ -78,36 +78,55 @@ Response problem(int status, std::string_view code, std::string_view title, std:
   return response;
 }
 
-void Router::add(std::string method, std::string pattern, Handler handler) {
+void Router::add(std::string method, std::string pattern, Handler handler, Weight weight) {
   CHECK(!pattern.empty() && pattern.front() == '/');
   auto segments = split(pattern);
   for (const auto& route : routes_) CHECK(route.method != method || route.segments != segments);
-  routes_.push_back({std::move(method), std::move(segments), std::move(handler)});
+  routes_.push_back({std::move(method), std::move(segments), std::move(handler), weight});
 }
 
 void Router::report_failure(const Request& request, std::string_view what) const {
   if (failure_log_) failure_log_(request, what);
 }
 
-Response Router::dispatch(Request& request) const {
-  const auto path = split(request.path);
-  // The pattern is chosen before the method: DELETE /v1/jobs/counts must not fall through to the job named "counts".
+// The pattern is chosen before the method: DELETE /v1/jobs/counts must not fall through to the job named "counts".
+const std::vector<std::string>* Router::pattern_of(const std::vector<std::string>& path) const {
   const std::vector<std::string>* pattern = nullptr;
   for (const auto& route : routes_) {
     if (matches(route.segments, path) && (!pattern || is_more_specific(route.segments, *pattern)))
       pattern = &route.segments;
   }
+  return pattern;
+}
+
+const Router::Route* Router::route_of(const std::vector<std::string>& pattern, std::string_view method) const {
+  const Route* head = nullptr;
+  for (const auto& route : routes_) {
+    if (route.segments != pattern) continue;
+    if (route.method == method) return &route;
+    if (route.method == "GET" && method == "HEAD") head = &route;
+  }
+  return head;
+}
+
+bool Router::is_heavy(const Request& request) const {
+  const auto* const pattern = pattern_of(split(request.path));
+  const Route* const route = pattern ? route_of(*pattern, request.method) : nullptr;
+  return route != nullptr && route->weight == Weight::kHeavy;
+}
+
+Response Router::dispatch(Request& request) const {
+  const auto path = split(request.path);
+  const std::vector<std::string>* const pattern = pattern_of(path);
   if (!pattern) {
     return problem(404, "not-found", "There is nothing here", "no resource has the path " + request.path,
                    request.request_id);
   }
 
-  const Route* chosen = nullptr;
+  const Route* const chosen = route_of(*pattern, request.method);
   std::string allow;
   for (const auto& route : routes_) {
     if (route.segments != *pattern) continue;
-    const bool answers_head = route.method == "GET" && request.method == "HEAD" && !chosen;
-    if (route.method == request.method || answers_head) chosen = &route;
     allow += (allow.empty() ? "" : ", ") + route.method + (route.method == "GET" ? ", HEAD" : "");
   }
   allow += ", OPTIONS";

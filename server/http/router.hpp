@@ -21,7 +21,10 @@ Response problem(int status, std::string_view code, std::string_view title, std:
 class Router {
  public:
   /// `pattern`: segments, "{}" captures one, e.g. "/v1/jobs/{}/events". HEAD is answered by the GET handler without its body.
-  void add(std::string method, std::string pattern, Handler handler);
+  /// Heavy handlers (seconds of computing) run on at most half of the worker threads.
+  enum class Weight { kLight, kHeavy };
+  void add(std::string method, std::string pattern, Handler handler, Weight weight = Weight::kLight);
+  bool is_heavy(const Request& request) const;
   /// Who hears what a handler or a stream threw (any thread); the client gets the request id only.
   void on_failure(std::function<void(const Request&, std::string_view what)> log) { failure_log_ = std::move(log); }
   /// Finds and runs the handler. An exception becomes 500 "internal" with the request id, without details. The pattern is
@@ -30,7 +33,9 @@ class Router {
   void report_failure(const Request& request, std::string_view what) const;
 
  private:
-  struct Route { std::string method; std::vector<std::string> segments; Handler handler; };
+  struct Route { std::string method; std::vector<std::string> segments; Handler handler; Weight weight; };
+  const std::vector<std::string>* pattern_of(const std::vector<std::string>& path) const;   // nullptr: none fits
+  const Route* route_of(const std::vector<std::string>& pattern, std::string_view method) const;   // GET answers HEAD
   std::vector<Route> routes_;
   std::function<void(const Request&, std::string_view)> failure_log_;
 };

@@ -219,7 +219,7 @@ Awaitable<void> Session::wait_for_worker() {
 
 Awaitable<void> Session::handle() {
   auto task = as_worker_task([this] { response_ = shared_.router.dispatch(request_); });
-  const bool is_queued = shared_.workers.submit_request(std::move(task));
+  const bool is_queued = shared_.workers.submit_request(std::move(task), shared_.router.is_heavy(request_));
   if (is_queued) {
     co_await wait_for_worker();
   } else {

@@ -224,6 +224,38 @@ TEST(HttpLimits, AFullQueueIsToldAtOnce) {
   EXPECT_EQ((a_is_refused ? b : a).read_reply().body, "passed");
 }
 
+TEST(HttpLimits, HeavyRequestsLeaveThreadsForTheOthers) {
+  ServerConfig config;
+  config.worker_threads = 2;
+  Door door;
+  TestServer server(
+      [&door](Router& router) {
+        router.add(
+            "GET", "/door",
+            [&door](const Request&) {
+              door.pass();
+              return text("passed");
+            },
+            Router::Weight::kHeavy);
+        router.add("GET", "/light", [](const Request&) { return text("light"); });
+      },
+      config);
+  server.run();
+  std::vector<std::unique_ptr<RawClient>> heavy;
+  for (int i = 0; i < 4; ++i) {
+    heavy.push_back(std::make_unique<RawClient>(server.port()));
+    heavy.back()->send(get("/door"));
+  }
+  door.wait_for_arrivals(1);
+  for (int i = 0; i < 3; ++i) {  // would wait for the door if a heavy request could hold both threads
+    RawClient light(server.port());
+    light.send(get("/light"));
+    EXPECT_EQ(light.read_reply().body, "light");
+  }
+  door.open();
+  for (auto& client : heavy) EXPECT_EQ(client->read_reply().body, "passed");
+}
+
 TEST(HttpLimits, ConnectionsBeyondTheLimitAreToldAndTheOthersGoOn) {
   ServerConfig config;
   config.connections_max = 2;
