@@ -23,6 +23,21 @@ double number_option(const std::string& option, const std::string& text) {
   return *value;
 }
 
+namespace {
+
+/// The word that stands where a command should, if it is none (CLI11 only says that a subcommand is required).
+std::optional<std::string> unknown_command(const CLI::App& app, const std::vector<std::string>& arguments) {
+  for (std::size_t i = 0; i < arguments.size(); ++i) {
+    if (arguments[i] == "--server") ++i;  // and its value
+    if (i >= arguments.size() || arguments[i].empty() || arguments[i][0] == '-') continue;
+    if (app.get_subcommand_no_throw(arguments[i]) == nullptr) return arguments[i];
+    break;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
 int run(const std::vector<std::string>& arguments, Environment& env) {
   CLI::App app("colony: grow cell colonies on a colonyd server", "colony");
   app.require_subcommand(1);
@@ -53,7 +68,8 @@ int run(const std::vector<std::string>& arguments, Environment& env) {
   } catch (const CLI::Success& wanted) {  // --help, --version
     app.exit(wanted, env.out, env.err);
   } catch (const CLI::ParseError& wrong) {
-    env.err << "error: " << wrong.what() << "\n  `colony --help` or `colony COMMAND --help` shows what there is\n";
+    const std::optional<std::string> unknown = unknown_command(app, arguments);
+    env.err << "error: " << (unknown ? "there is no command '" + printable(*unknown) + "'" : wrong.what()) << "\n  `colony --help` or `colony COMMAND --help` shows what there is\n";
     code = ExitCode::kUsage;
   } catch (const Json::exception&) {  // a member of another type than the interface says
     env.err

@@ -122,10 +122,10 @@ void add_picture_commands(CLI::App& app, Session& session, Action& action) {
   command->add_option("ID", image->id, "Job id, or its unique end")->required();
   command->add_option("-o,--output", image->output, "File; it appears whole or not at all");
   command->add_option("--at-h", image->at_h, "Model time, h (default: now, or the end)");
-  command->add_option("--style", image->style, "shaded, contours, ...");
+  command->add_option("--style", image->style, "shaded or contours");
   command->add_option("--width-px", image->width_px, "Width of the picture");
   command->add_option("--um-per-px", image->um_per_px, "Scale of the picture (instead of its width)");
-  command->add_option("--colour-by", image->colour_by, "What the colours show");
+  command->add_option("--colour-by", image->colour_by, "What the colours show: activity, generation, age or volume");
   command->add_flag("--no-scale-bar", image->no_scale_bar, "Without the scale bar");
   command->callback(
       [&session, &action, image] { action = [&session, image] { return fetch_image(session, *image); }; });

@@ -271,6 +271,11 @@ TEST_F(Cli, SeriesForPeople) {
   EXPECT_THAT(out(), HasSubstr("cells  .#  to 14\n"));
 }
 
+TEST_F(Cli, AnUnknownCommandIsNamed) {
+  EXPECT_EQ(run({"--server", "http://127.0.0.1:1", "bogus"}), 2);
+  EXPECT_THAT(err(), HasSubstr("there is no command 'bogus'"));
+}
+
 TEST_F(Cli, FoundersMakeASpec) {
   write_file("t.csv", "track;time;Y;X\r\n1;0;10;20\r\n2;0;30;60\r\n");
   EXPECT_EQ(run({"founders", path("t.csv"), "--um-per-px", "2", "--until-time", "42", "--seed", "5", "-o",
