@@ -1,6 +1,7 @@
 #include "client/cli/app.hpp"
 
 #include <algorithm>
+#include <optional>
 
 #include <CLI/CLI.hpp>
 
@@ -30,7 +31,8 @@ std::optional<std::string> unknown_command(const CLI::App& app, const std::vecto
   for (std::size_t i = 0; i < arguments.size(); ++i) {
     if (arguments[i] == "--server") ++i;  // and its value
     if (i >= arguments.size() || arguments[i].empty() || arguments[i][0] == '-') continue;
-    if (app.get_subcommand_no_throw(arguments[i]) == nullptr) return arguments[i];
+    const auto has_name = [&](const CLI::App* command) { return command->get_name() == arguments[i]; };
+    if (app.get_subcommands(has_name).empty()) return arguments[i];
     break;
   }
   return std::nullopt;
