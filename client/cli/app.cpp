@@ -29,8 +29,11 @@ namespace {
 /// The word that stands where a command should, if it is none (CLI11 only says that a subcommand is required).
 std::optional<std::string> unknown_command(const CLI::App& app, const std::vector<std::string>& arguments) {
   for (std::size_t i = 0; i < arguments.size(); ++i) {
-    if (arguments[i] == "--server") ++i;  // and its value
-    if (i >= arguments.size() || arguments[i].empty() || arguments[i][0] == '-') continue;
+    if (arguments[i] == "--server") {
+      ++i;  // its value is no command
+      continue;
+    }
+    if (arguments[i].empty() || arguments[i][0] == '-') continue;
     const auto has_name = [&](const CLI::App* command) { return command->get_name() == arguments[i]; };
     if (app.get_subcommands(has_name).empty()) return arguments[i];
     break;
