@@ -128,6 +128,16 @@ TEST(Submit, IsGivenUpWhenTheServerEnds) {
   EXPECT_EQ(image.status, 503) << "drawing, too";
 }
 
+TEST(Paths, BeginWithTheBasePath) {
+  api::ApiConfig config = ApiFixture::config();
+  config.base_path = "/colony";
+  ApiFixture fixture(config);
+  EXPECT_EQ(header(fixture.post("/v1/jobs", kSpec), "Location"), "/colony" + kJob);
+  EXPECT_THAT(header(fixture.get("/v1/jobs"), "Link"), HasSubstr("</colony/v1/jobs?cursor="));
+  auto openapi = fixture.get("/openapi.json");
+  EXPECT_EQ(json_of(openapi)["servers"][0]["url"], "/colony");
+}
+
 TEST(Submit, AThousandErrorsAreListedAndAllCounted) {
   ApiFixture fixture;
   std::string positions;
