@@ -89,6 +89,22 @@ std::string set_hosts(Config& config, const std::string& value) {
   return {};
 }
 
+std::string set_base_path(Config& config, const std::string& value) {
+  // Only what needs no escape in a URL: the same text then stands in the address, in Location and in openapi.json.
+  const bool right = std::all_of(value.begin(), value.end(), [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_' ||
+           c == '.' || c == '/';
+  });
+  const bool has_empty_segment = value.find("//") != std::string::npos || value.ends_with('/');
+  const bool has_dots =
+      (value + "/").find("/./") != std::string::npos || (value + "/").find("/../") != std::string::npos;
+  if (!value.empty() && (!right || value.front() != '/' || has_empty_segment || has_dots)) {
+    return "must be empty or like /colony: segments of a-z, A-Z, 0-9, '-', '_' and '.', no '/' at the end";
+  }
+  config.http.base_path = value;
+  return {};
+}
+
 template <class T>
 Key integer_key(std::string name, std::uint64_t min, std::uint64_t max, std::string text, T& (*field)(Config&)) {
   auto set = [min, max, field](Config& config, const std::string& value) -> std::string {
@@ -109,6 +125,8 @@ const std::vector<Key>& keys() {
       {"server.listen", KeyType::kText, 0, 0, "loopback address and port; default 127.0.0.1:8080", set_listen},
       {"server.data", KeyType::kText, 0, 0,
        "folder of all files; default $XDG_DATA_HOME/colony or ~/.local/share/colony", set_data},
+      {"server.base_path", KeyType::kText, 0, 0,
+       "where a proxy shows this server, e.g. /colony; every path must begin with it; default none", set_base_path},
       {"server.allowed_hosts", KeyType::kTexts, 0, 0, "host names a request may be for, without port", set_hosts},
       integer_key<Size>("jobs.concurrent_max", 1, 256, "colonies growing at a time; default 1",
                         [](Config& c) -> Size& { return c.jobs.concurrent_max; }),
@@ -132,6 +150,12 @@ const std::vector<Key>& keys() {
       integer_key<Big>("limits.disk_free_bytes_min", 0, 1'000'000'000'000'000,
                        "free disk below which /readyz refuses; default 10^8",
                        [](Config& c) -> Big& { return c.disk_free_bytes_min; }),
+      integer_key<Big>("limits.database_bytes_max", 0, 1'000'000'000'000'000,
+                       "size of the database, beyond which jobs pause; default 0: as much as the disk holds",
+                       [](Config& c) -> Big& { return c.store.database_bytes_max; }),
+      integer_key<Big>("limits.free_bytes_min", 0, 1'000'000'000'000'000,
+                       "free disk with which jobs that the disk paused go on; default 16777216",
+                       [](Config& c) -> Big& { return c.jobs.free_bytes_min; }),
   };
   return table;
 }

@@ -73,6 +73,7 @@ int serve(const Config& config) {
   api_config.body_bytes_max = config.http.body_bytes_max;
   api_config.header_bytes_max = config.http.header_bytes_max;
   api_config.connections_max = config.http.connections_max;
+  api_config.base_path = config.http.base_path;
   api_config.disk_free_bytes_min = config.disk_free_bytes_min;
   api::Api api(*jobs, api_config);
   http::Router router;
@@ -91,7 +92,8 @@ int serve(const Config& config) {
   (*server)->run();
   const bool is_v6 = config.http.address.find(':') != std::string::npos;
   const std::string host = is_v6 ? "[" + config.http.address + "]" : config.http.address;
-  std::printf("listening on http://%s:%u\n", host.c_str(), static_cast<unsigned>((*server)->port()));
+  std::printf("listening on http://%s:%u%s\n", host.c_str(), static_cast<unsigned>((*server)->port()),
+              config.http.base_path.c_str());
   std::fflush(stdout);
   spdlog::info("data in {}", config.store.data_dir);
 

@@ -22,7 +22,8 @@
 namespace colony::server::api {
 
 struct ApiConfig {
-  std::string version;  // of the program
+  std::string version;    // of the program
+  std::string base_path;  // what paths in answers begin with; empty or "/colony"
   JobsConfig jobs;
   std::size_t body_bytes_max = 1024 * 1024;
   std::size_t header_bytes_max = 8 * 1024;
@@ -37,14 +38,17 @@ inline constexpr std::size_t kEventsPerPageDefault = 1000;
 inline constexpr std::size_t kSeriesPointsMax = 10'000;
 inline constexpr std::size_t kSeriesPointsDefault = 200;
 inline constexpr std::size_t kIdempotencyKeyBytesMax = 200;
+/// Placing more founders than this can take long: one submission at a time may.
+inline constexpr std::uint64_t kFoundersPlacedFreely = 1000;
 
 /// What handlers work with.
 struct Context {
   JobService& jobs;
   const ApiConfig config;
-  std::atomic<bool> draining{false};
-  std::string schema_text;  // made once
+  std::atomic<bool> draining{false};  // asks long computations to give up, too
+  std::string schema_text;            // made once
   std::string openapi_text;
+  std::atomic<bool> places_many{false};  // a submission of many founders is being checked
 };
 
 /// A request that has passed the table's checks.
@@ -77,17 +81,19 @@ class Api {
   Api(JobService& jobs, ApiConfig config);
   /// The router keeps references to this object.
   void add_routes(http::Router& router);
-  /// From now on /readyz answers 503.
+  /// From now on /readyz answers 503, and what takes long gives up and is answered with 503.
   void drain() { context_->draining = true; }
 
  private:
   std::unique_ptr<Context> context_;
 };
 
-/// Runs one endpoint: query, Accept and Content-Type first, then its handler.
+/// Runs one endpoint: query, Accept and Content-Type first, then its handler. A handler that the end of the server
+/// stopped is answered with 503.
 http::Response run_endpoint(const Endpoint& endpoint, Context& context, const http::Request& request);
 
 http::Response json_response(int status, const Json& body);
+http::Response failure(const Error& error, const Call& call);
 
 // One function per endpoint.
 http::Response post_job(Context& context, const Call& call);

@@ -15,6 +15,8 @@ constexpr std::array<std::string_view, 2> kUntilNames = {"time_h", "cells"};
 constexpr std::array<std::pair<std::string_view, std::string_view>, 2> kLaterPresets = {
     {{"young-colony", "moves of cells (motility)"}, {"tumour", "several layers"}}};
 
+constexpr const char* kSummary = "the job spec is wrong; nothing was stored";
+
 using Errors = std::vector<FieldError>;
 
 void check_names(const Json& object, const std::string& pointer, std::span<const std::string_view> known,
@@ -113,6 +115,42 @@ void decode_until(const Json* json, const SpecLimits& limits, JobSpec& spec, Err
   if (spec.run.until.cells && !json->contains("time_h")) spec.run.until.time_h = kUntilTimeImplied_h;
 }
 
+void check_founder_count(const RunSpec& run, const SpecLimits& limits, Errors& errors) {
+  const std::uint64_t count = founder_count(run.params.founders);
+  if (count > limits.cells_max) {
+    errors.push_back(
+        {"/model/founders", "must be at most " + std::to_string(limits.cells_max) + ", the limit of cells in a job"});
+  }
+  if (run.until.cells && count > *run.until.cells) {
+    errors.push_back({"/until/cells", "must be at least the number of founders, " + std::to_string(count)});
+  }
+}
+
+// `limits` absent: a stored spec.
+Result<JobSpec> decode(const Json& body, const SpecLimits* limits) {
+  if (!body.is_object()) return Error{ErrorCode::kInvalid, kSummary, {{"", "must be an object"}}};
+  JobSpec spec;
+  spec.run.seed = kSeedDefault;
+  spec.run.params = *preset(kPresetDefault);
+  Errors errors;
+  const auto member = [&](const char* name) -> const Json* {
+    const auto found = body.find(name);
+    return found == body.end() ? nullptr : &*found;
+  };
+  check_names(body, "", kSpecNames, errors);
+  if (const Json* json = member("name")) decode_name(*json, spec, errors);
+  if (const Json* json = member("labels")) decode_labels(*json, spec, errors);
+  if (const Json* json = member("seed")) decode_seed(*json, spec, errors);
+  if (const Json* json = member("preset")) decode_preset(*json, spec, errors);
+  decode_until(member("until"), limits == nullptr ? SpecLimits{} : *limits, spec, errors);
+
+  const std::size_t before_model = errors.size();
+  if (const Json* json = member("model")) decode_model(*json, "/model", spec.run.params, errors);
+  if (limits != nullptr && errors.size() == before_model) check_founder_count(spec.run, *limits, errors);
+  if (!errors.empty()) return Error{ErrorCode::kInvalid, kSummary, std::move(errors)};
+  return spec;
+}
+
 }  // namespace
 
 std::string label_key_error(std::string_view key) {
@@ -128,46 +166,15 @@ std::string label_value_error(std::string_view value) {
   return {};
 }
 
-Result<JobSpec> decode_spec(const Json& body, const SpecLimits& limits) {
-  const std::string summary = "the job spec is wrong; nothing was stored";
-  if (!body.is_object()) return Error{ErrorCode::kInvalid, summary, {{"", "must be an object"}}};
-  JobSpec spec;
-  spec.run.seed = kSeedDefault;
-  spec.run.params = *preset(kPresetDefault);
-  Errors errors;
-  const auto member = [&](const char* name) -> const Json* {
-    const auto found = body.find(name);
-    return found == body.end() ? nullptr : &*found;
-  };
-  check_names(body, "", kSpecNames, errors);
-  if (const Json* json = member("name")) decode_name(*json, spec, errors);
-  if (const Json* json = member("labels")) decode_labels(*json, spec, errors);
-  if (const Json* json = member("seed")) decode_seed(*json, spec, errors);
-  if (const Json* json = member("preset")) decode_preset(*json, spec, errors);
-  decode_until(member("until"), limits, spec, errors);
+Result<JobSpec> decode_spec(const Json& body, const SpecLimits& limits) { return decode(body, &limits); }
 
-  const std::size_t before_model = errors.size();
-  if (const Json* json = member("model")) decode_model(*json, "/model", spec.run.params, errors);
-  const FounderParams& founders = spec.run.params.founders;
-  const std::uint64_t founder_count =
-      founders.positions_um.empty() ? static_cast<std::uint64_t>(founders.count) : founders.positions_um.size();
-  if (errors.size() == before_model && founder_count > limits.cells_max) {
-    errors.push_back(
-        {"/model/founders", "must be at most " + std::to_string(limits.cells_max) + ", the limit of cells in a job"});
-  }
-  if (errors.size() == before_model && spec.run.until.cells && founder_count > *spec.run.until.cells) {
-    errors.push_back({"/until/cells", "must be at least the number of founders, " + std::to_string(founder_count)});
-  }
-  // Placing founders needs valid parameters and the right seed; it is the one check that can take long, so it comes
-  // last.
-  if (errors.empty()) {
-    if (const auto placed = place_founders(spec.run); !placed) {
-      for (const FieldError& field : placed.error().fields) errors.push_back({"/model" + field.pointer, field.message});
-      if (errors.empty()) errors.push_back({"/model/founders", placed.error().message});
-    }
-  }
-  if (!errors.empty()) return Error{ErrorCode::kInvalid, summary, std::move(errors)};
-  return spec;
+Status check_founders(const RunSpec& spec, StopFlag stop) {
+  const auto placed = place_founders(spec, stop);
+  if (placed) return Ok{};
+  Errors errors;
+  for (const FieldError& field : placed.error().fields) errors.push_back({"/model" + field.pointer, field.message});
+  if (errors.empty()) errors.push_back({"/model/founders", placed.error().message});
+  return Error{ErrorCode::kInvalid, kSummary, std::move(errors)};
 }
 
 Json encode_spec(const JobSpec& spec) {
@@ -180,7 +187,7 @@ Json encode_spec(const JobSpec& spec) {
 Result<RunSpec> decode_stored_spec(const std::string& spec_json) {
   const auto json = parse_json(spec_json);
   if (!json) return json.error();
-  auto spec = decode_spec(*json, SpecLimits{});
+  auto spec = decode(*json, nullptr);
   if (!spec) return spec.error();
   return std::move(spec->run);
 }

@@ -3,7 +3,8 @@
 // parameter
 //          that counts, and decode(encode(spec)) is the same spec. Nothing is clamped or ignored: unknown names are
 //          errors.
-// Errors:  kInvalid. Founders that cannot be placed are found here too, before a job exists.
+// Errors:  kInvalid. Whether the founders find their places is check_founders' question: it can take long, and a stored
+//          spec has passed it.
 // Threads: pure.
 #pragma once
 
@@ -39,12 +40,17 @@ struct JobSpec {
   RunSpec run;
 };
 
+/// A spec as it is submitted, held to the limits of this server.
 Result<JobSpec> decode_spec(const Json& body, const SpecLimits& limits);
+
+/// Whether the founders of a decoded spec can be placed; pointers as decode_spec's. Throws Stopped when asked to stop.
+Status check_founders(const RunSpec& spec, StopFlag stop);
 
 /// What decides the history, complete: seed, preset, until, model. Name and labels belong to the job, not to its spec.
 Json encode_spec(const JobSpec& spec);
 
-/// A stored spec, for the runner (jobs/ has no JSON). Only the limits that held when it was submitted apply.
+/// A stored spec, for the runner (jobs/ has no JSON). It was held to the limits of its day and is not held to today's; its
+/// founders are not placed.
 Result<RunSpec> decode_stored_spec(const std::string& spec_json);
 
 /// What the store keeps of a spec.

@@ -1,4 +1,5 @@
 // The table of operations, and what is checked before any handler runs.
+#include "engine/base/stop.hpp"
 #include "server/api/api.hpp"
 #include "server/api/openapi.hpp"
 #include "server/api/schema.hpp"
@@ -45,7 +46,7 @@ std::vector<Endpoint> make_endpoints() {
          "only check: answer the complete spec and an estimate; nothing is stored"}},
        {{200, "the same job as before (same key and body), or the answer of a dry run"}, {201, "the new job"}},
        "Submission",
-       {kMalformed, kUnsupportedMediaType, kKeyReused, kBusy},
+       {kMalformed, kUnsupportedMediaType, kKeyReused, kBusy, kOccupied},
        post_job},
       {"GET",
        "/v1/jobs",
@@ -221,12 +222,6 @@ std::vector<Endpoint> make_endpoints() {
   };
 }
 
-std::string joined(std::span<const std::string_view> names) {
-  std::string out;
-  for (const std::string_view name : names) out += (out.empty() ? "" : ", ") + std::string(name);
-  return out;
-}
-
 }  // namespace
 
 std::span<const Endpoint> endpoints() {
@@ -256,14 +251,21 @@ http::Response run_endpoint(const Endpoint& endpoint, Context& context, const ht
                              {{"Content-Type", "must be application/json"}}},
                             request.request_id);
   }
-  return endpoint.handler(context, Call{request, std::move(*query), media});
+  try {
+    return endpoint.handler(context, Call{request, std::move(*query), media});
+  } catch (const Stopped&) {
+    return problem_response(
+        {ErrorCode::kUnavailable, "the server is ending; the work was given up, nothing was stored"},
+        request.request_id);
+  }
 }
 
 Api::Api(JobService& jobs, ApiConfig config) {
   const SpecLimits limits{config.jobs.cells_max};
   context_ = std::unique_ptr<Context>(new Context{jobs, std::move(config), false, {}, {}});
   context_->schema_text = to_text(job_spec_schema(limits));
-  context_->openapi_text = to_text(openapi_document(endpoints(), limits, context_->config.version));
+  context_->openapi_text =
+      to_text(openapi_document(endpoints(), limits, context_->config.version, context_->config.base_path));
 }
 
 void Api::add_routes(http::Router& router) {
@@ -277,6 +279,10 @@ void Api::add_routes(http::Router& router) {
                  return run_endpoint(endpoint, *context, request);
                });
   }
+}
+
+http::Response failure(const Error& error, const Call& call) {
+  return problem_response(error, call.request.request_id);
 }
 
 http::Response json_response(int status, const Json& body) {

@@ -7,15 +7,16 @@
 namespace colony::server::api {
 namespace {
 
-// Preset `paper`: a colony doubles each cycle up to about 12 cells; from then on sqrt(cells) grows by 0.78 a cycle (12
-// cells at 50 h, 58 at 109 h, 292 at 262 h). Confluent cells stand at about 0.009 per um2. The generation limit g ends
-// a lone colony near (0.80 g)^2 cells (1,030 for g = 40).
+// Preset `paper`, as this engine grows it: a colony doubles each cycle up to about 12 cells; from then on sqrt(cells)
+// grows by about 0.75 a cycle (12 cells at 50 h, 61 at 120 h, 314 at 275 h, 1,000 at 503 h). Confluent cells stand at
+// about 0.009 per um2. The generation limit g ends a lone colony near (0.81 g)^2 cells (about 1,060 for g = 40). A
+// division takes 2.4 searches on average.
 constexpr double kCellsExponential = 12.0;
-constexpr double kRootGain = 0.78;
-constexpr double kCellsPerGeneration = 0.80;
+constexpr double kRootGain = 0.75;
+constexpr double kCellsPerGeneration = 0.81;
 constexpr double kDensity_per_um2 = 0.009;
 constexpr double kWallPerSearch_s = 2.0e-3;  // at the evaluations and points of preset `paper`
-constexpr double kSearchesPerCell = 3.0;
+constexpr double kSearchesPerCell = 2.4;
 constexpr double kEvaluations = 32.0 * 8.0 * 256.0;
 constexpr double kMemoryPerCell = 1500.0, kMemoryBase = 30e6;
 constexpr double kStoredPerCell = 3000.0;

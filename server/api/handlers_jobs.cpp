@@ -1,5 +1,6 @@
 // Handlers of jobs themselves: submit, list, show, command, delete.
 #include <algorithm>
+#include <atomic>
 
 #include "engine/base/digest.hpp"
 #include "server/api/api.hpp"
@@ -8,10 +9,6 @@
 
 namespace colony::server::api {
 namespace {
-
-http::Response failure(const Error& error, const Call& call) {
-  return problem_response(error, call.request.request_id);
-}
 
 // The key of the request; empty: none.
 Result<std::string> idempotency_key(const http::Request& request) {
@@ -73,6 +70,25 @@ Status check_no_arguments(const std::string& body) {
   return Ok{};
 }
 
+// The turn of a submission with many founders; a small one needs none. Two large ones would hold workers that all other
+// requests wait for.
+class ManyFounders {
+ public:
+  ManyFounders(Context& context, std::uint64_t count)
+      : flag_(count > kFoundersPlacedFreely ? &context.places_many : nullptr),
+        is_ours_(flag_ == nullptr || !flag_->exchange(true)) {}
+  ~ManyFounders() {
+    if (flag_ != nullptr && is_ours_) *flag_ = false;
+  }
+  ManyFounders(const ManyFounders&) = delete;
+  ManyFounders& operator=(const ManyFounders&) = delete;
+  bool is_ours() const { return is_ours_; }
+
+ private:
+  std::atomic<bool>* const flag_;
+  const bool is_ours_;
+};
+
 http::Response command(Context& context, const Call& call,
                        Result<JobService::Commanded> (JobService::*method)(const std::string&)) {
   if (const Status arguments = check_no_arguments(call.request.body); !arguments)
@@ -91,6 +107,17 @@ http::Response post_job(Context& context, const Call& call) {
   if (!body) return failure(body.error(), call);
   const auto spec = decode_spec(*body, SpecLimits{context.config.jobs.cells_max});
   if (!spec) return failure(spec.error(), call);
+  {
+    const ManyFounders turn(context, founder_count(spec->run.params.founders));
+    if (!turn.is_ours()) {
+      return problem_response(ProblemKind::kOccupied,
+                              {ErrorCode::kBusy, "a submission of more than " + std::to_string(kFoundersPlacedFreely) +
+                                                     " founders is being checked; one at a time"},
+                              call.request.request_id);
+    }
+    if (const Status placed = check_founders(spec->run, &context.draining); !placed)
+      return failure(placed.error(), call);
+  }
   if (call.query.boolean("dry_run", false)) {
     Json labels = Json::object();
     for (const auto& [name, value] : spec->labels) labels[name] = value;
@@ -106,7 +133,7 @@ http::Response post_job(Context& context, const Call& call) {
   const auto submitted = context.jobs.submit(job);
   if (!submitted) return failure(submitted.error(), call);
   http::Response response = json_response(submitted->created ? 201 : 200, encode_job(submitted->view));
-  response.headers.set("Location", "/v1/jobs/" + submitted->view.job.id);
+  response.headers.set("Location", context.config.base_path + "/v1/jobs/" + submitted->view.job.id);
   return response;
 }
 
@@ -131,7 +158,7 @@ http::Response get_jobs(Context& context, const Call& call) {
   http::Response response =
       json_response(200, {{"items", std::move(items)}, {"next", page->next ? Json(*page->next) : Json(nullptr)}});
   if (page->next) {
-    std::string target = "/v1/jobs?";
+    std::string target = context.config.base_path + "/v1/jobs?";
     for (const auto& [name, value] : call.request.query) {
       if (name != "cursor") target += percent_encoded(name) + "=" + percent_encoded(value) + "&";
     }

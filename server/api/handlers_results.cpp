@@ -10,10 +10,6 @@
 namespace colony::server::api {
 namespace {
 
-http::Response failure(const Error& error, const Call& call) {
-  return problem_response(error, call.request.request_id);
-}
-
 Error wrong_parameter(std::string name, std::string message) {
   return {ErrorCode::kInvalid, "query parameters are wrong", {{std::move(name), std::move(message)}}};
 }
@@ -141,7 +137,7 @@ http::Response get_image(Context& context, const Call& call) {
   spec.scale_bar = call.query.boolean("scale_bar", true);
   const auto at = context.jobs.colony_at(call.id(), call.query.number("at_h"));
   if (!at) return failure(at.error(), call);
-  const auto picture = render(*at->colony, at->spec->params, spec);
+  const auto picture = render(*at->colony, at->spec->params, spec, &context.draining);
   if (!picture) return failure(picture.error(), call);
   http::Response response;
   response.headers.set("Content-Type", "image/png");

@@ -140,7 +140,8 @@ Json request_body_of(const Endpoint& endpoint) {
 
 }  // namespace
 
-Json openapi_document(std::span<const Endpoint> table, const SpecLimits& limits, std::string_view version) {
+Json openapi_document(std::span<const Endpoint> table, const SpecLimits& limits, std::string_view version,
+                      std::string_view base_path) {
   Json paths = Json::object();
   for (const Endpoint& endpoint : table) {
     std::string method(endpoint.method);
@@ -161,7 +162,7 @@ Json openapi_document(std::span<const Endpoint> table, const SpecLimits& limits,
              "Units are in names: _h, _um, _um2, _um3, _rad; wall times _at, RFC 3339 UTC. Errors are problem "
              "documents (RFC 9457) that name every wrong field at once."}}},
           {"jsonSchemaDialect", "https://json-schema.org/draft/2020-12/schema"},
-          {"servers", Json::array({{{"url", "/"}}})},
+          {"servers", Json::array({{{"url", base_path.empty() ? "/" : base_path}}})},
           {"paths", std::move(paths)},
           {"components",
            {{"parameters",

@@ -11,6 +11,7 @@
 
 namespace colony::server::api {
 
-Json openapi_document(std::span<const Endpoint> table, const SpecLimits& limits, std::string_view version);
+Json openapi_document(std::span<const Endpoint> table, const SpecLimits& limits, std::string_view version,
+                      std::string_view base_path);
 
 }  // namespace colony::server::api

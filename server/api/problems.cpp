@@ -8,7 +8,7 @@
 namespace colony::server::api {
 namespace {
 
-constexpr std::array<ProblemRow, 14> kTable = {{
+constexpr std::array<ProblemRow, 15> kTable = {{
     {ProblemKind::kMalformed, 400, "malformed", "The request cannot be read", 0},
     {ProblemKind::kInvalid, 422, "invalid", "Fields of the request are wrong", 0},
     {ProblemKind::kNotFound, 404, "not-found", "There is no such thing", 0},
@@ -18,6 +18,7 @@ constexpr std::array<ProblemRow, 14> kTable = {{
     {ProblemKind::kTimeNotReached, 409, "time-not-reached", "The job has not reached this time", 0},
     {ProblemKind::kLimit, 422, "limit", "A limit would be exceeded", 0},
     {ProblemKind::kBusy, 429, "queue-full", "The queue is full", 10},
+    {ProblemKind::kOccupied, 503, "busy", "The server is at work on another one", 5},
     {ProblemKind::kStorage, 503, "storage", "The storage refused", 10},
     {ProblemKind::kUnavailable, 503, "unavailable", "The server is not ready", 5},
     {ProblemKind::kInternal, 500, "internal", "A bug in the server", 0},

@@ -23,6 +23,7 @@ enum class ProblemKind {
   kTimeNotReached,
   kLimit,
   kBusy,
+  kOccupied,
   kStorage,
   kUnavailable,
   kInternal,

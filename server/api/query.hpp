@@ -48,6 +48,8 @@ std::optional<std::uint64_t> parse_integer(std::string_view text);
 /// A finite decimal number; nullopt for anything else ("NaN", "inf", "0x10", spaces).
 std::optional<double> parse_number(std::string_view text);
 std::vector<std::string> split(std::string_view text, char separator);
+/// "a, b, c"
+std::string joined(std::span<const std::string_view> names);
 
 /// Index of the offered media type that an Accept header prefers (RFC 9110, 12.5.1; ties go to the earlier one);
 /// without the header the first. nullopt: none is acceptable.

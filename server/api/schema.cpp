@@ -115,8 +115,13 @@ Json model_schema(bool is_complete) {
     }
     Json schema = std::visit(ParamSchema{info}, info.access);
     schema["description"] = std::string(info.text) + (info.unit.empty() ? "" : " (" + std::string(info.unit) + ")");
-    // Positions have no default: without them count and radius_um hold.
-    if (!info.path.ends_with("positions_um")) schema["default"] = encode_param(info, paper);
+    if (info.path.ends_with("positions_um")) {
+      // No default: without positions count and radius_um hold.
+      schema["description"] = schema["description"].get<std::string>() +
+                              "; the limit of a request's body (1 MiB unless configured otherwise) holds about 60,000";
+    } else {
+      schema["default"] = encode_param(info, paper);
+    }
     (*parent)["properties"][leaf] = std::move(schema);
     if (!info.path.starts_with("founders.")) require(*parent, leaf);
   }

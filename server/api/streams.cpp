@@ -122,14 +122,21 @@ EventStream::EventStream(JobService& jobs, const JobView& view, StreamWish wish,
 void EventStream::on_ready(std::function<void()> wake) { subscription_ = jobs_.subscribe(job_key_, std::move(wake)); }
 
 void EventStream::append_progress(std::string& out, const JobView& view, bool is_last) {
-  const auto now = clock_();
-  if (!is_last && last_progress_at_ && now - *last_progress_at_ < kProgressInterval) return;
+  wake_after_.reset();
   Json data = {{"state", name_of(view.job.state)}, {"last_seq", view.job.last_seq}};
   data.update(encode_progress(view.progress));
   std::string text = to_text(data);
   if (text == last_progress_) return;
+  const auto now = clock_();
+  const bool is_news = is_last || last_state_ != view.job.state;
+  if (const auto due = last_progress_at_.value_or(now - kProgressInterval) + kProgressInterval; !is_news && now < due) {
+    // Nothing need happen after this: a job that pauses is silent. Rounded up, so that the next pull is not too early.
+    wake_after_ = std::chrono::ceil<std::chrono::milliseconds>(due - now);
+    return;
+  }
   out += "event: progress\ndata: " + text + "\n\n";
   last_progress_ = std::move(text);
+  last_state_ = view.job.state;
   last_progress_at_ = now;
 }
 
@@ -141,14 +148,20 @@ http::BodySource::Pull EventStream::pull(std::string& out) {
   // Deleted while it was watched, or the storage failed: without `event: end` the reader reconnects and is told.
   if (!view) return Pull::kEnd;
   if (wish_.events) {
-    const auto events = jobs_.events(id_, wish_.filter, kEventsPerRead);
-    if (!events) return Pull::kEnd;
-    for (const Event& event : *events) {
-      out += "event: " + std::string(name_of(event.kind())) + "\nid: " + std::to_string(event.seq) +
-             "\ndata: " + to_text(encode_event(event)) + "\n\n";
-      wish_.filter.after = event.seq;
+    if (page_.empty()) {
+      auto events = jobs_.events(id_, wish_.filter, kEventsPerRead);
+      if (!events) return Pull::kEnd;
+      page_ = std::move(*events);
     }
-    if (!events->empty()) {
+    if (!page_.empty()) {
+      std::size_t used = 0;
+      for (; used < page_.size() && out.size() < kPieceBytes; ++used) {
+        const Event& event = page_[used];
+        out += "event: " + std::string(name_of(event.kind())) + "\nid: " + std::to_string(event.seq) +
+               "\ndata: " + to_text(encode_event(event)) + "\n\n";
+        wish_.filter.after = event.seq;
+      }
+      page_.erase(page_.begin(), page_.begin() + static_cast<std::ptrdiff_t>(used));
       if (wish_.progress) append_progress(out, *view, false);
       return Pull::kMore;
     }

@@ -1,6 +1,7 @@
 // streams: answers that are made piece by piece, so that their length costs no memory.
 // Promise: events are read from the store in pages by seq; no database transaction is held across a wait. A live stream
-//          gives every event of its filter exactly once and in order; progress at most 5 times a second.
+//          gives every event of its filter exactly once and in order; progress at most 5 times a second, but a
+//          change of state at once, and the latest progress within 200 ms, also if nothing happens after it.
 // Errors:  a failure after the first piece throws: the session cuts the connection without the last chunk, so that the
 //          reader sees a truncated body, never a short one that looks whole.
 // Threads: one pull at a time; wakes from any thread.
@@ -91,6 +92,7 @@ class EventStream : public http::BodySource {
   using Clock = std::function<std::chrono::steady_clock::time_point()>;
   EventStream(JobService& jobs, const JobView& view, StreamWish wish, Clock clock = std::chrono::steady_clock::now);
   Pull pull(std::string& out) override;
+  std::optional<std::chrono::milliseconds> wake_after() override { return wake_after_; }
   void on_ready(std::function<void()> wake) override;
   std::string_view keep_alive() const override { return ": keep-alive\n\n"; }
   std::string_view farewell() const override { return "event: bye\ndata: {}\n\n"; }
@@ -104,9 +106,12 @@ class EventStream : public http::BodySource {
   StreamWish wish_;  // filter.after moves on with every page
   const Clock clock_;
   std::unique_ptr<JobService::Subscription> subscription_;
+  std::vector<Event> page_;  // read, and not yet sent
   bool is_first_ = true;
   std::string last_progress_;
+  std::optional<JobState> last_state_;  // as said in it
   std::optional<std::chrono::steady_clock::time_point> last_progress_at_;
+  std::optional<std::chrono::milliseconds> wake_after_;  // there is progress that had to wait
 };
 
 }  // namespace colony::server::api

@@ -1,6 +1,7 @@
 // message: a request and a response as plain values, so that handlers need no socket and tests need no server.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <functional>
 #include <memory>
@@ -43,6 +44,8 @@ class BodySource {
   /// Appends the next piece (at most about 64 KiB) to `out`. kMore: call again once sent; kWait: nothing now, call again when
   /// woken (or after keep_alive); kEnd: the body is complete (what was appended is still sent).
   virtual Pull pull(std::string& out) = 0;
+  /// Asked after a pull that gave kWait, on the same thread: how soon to pull again even if nobody wakes; nullopt: no need.
+  virtual std::optional<std::chrono::milliseconds> wake_after() { return std::nullopt; }
   /// The session registers how it wants to be woken; `wake` may be called from any thread, also spuriously.
   virtual void on_ready(std::function<void()> wake) { (void)wake; }
   /// What to send after 15 s without a piece (an SSE comment); empty: nothing.

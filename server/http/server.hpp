@@ -20,7 +20,7 @@ struct ServerConfig {
   std::vector<std::string> allowed_hosts = {"127.0.0.1", "localhost", "[::1]"};   // without port
   std::string base_path;                       // e.g. "/colony", taken off Request::path; empty: none
   std::size_t io_threads = 1;
-  std::size_t worker_threads = 2;
+  std::size_t worker_threads = 4;
   std::size_t connections_max = 2000;
   std::size_t requests_waiting_max = 256;      // for a worker; beyond: 503 with Retry-After
   std::size_t header_bytes_max = 8 * 1024;

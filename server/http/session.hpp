@@ -8,6 +8,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -70,7 +71,7 @@ class Session : public std::enable_shared_from_this<Session> {
   Awaitable<bool> send_plain(const std::string& head);
   Awaitable<bool> send_stream(Framing framing);
   Awaitable<bool> send_piece(Framing framing, std::string_view piece);
-  Awaitable<void> wait_for_stream(std::string_view farewell);
+  Awaitable<void> wait_for_stream(std::string_view farewell, Connection::Clock::time_point until);
   Awaitable<void> wait_for_worker();
 
   std::optional<Refusal> admit() const;
@@ -105,6 +106,7 @@ class Session : public std::enable_shared_from_this<Session> {
   bool woken_ = false;
   std::string piece_;
   std::optional<BodySource::Pull> pulled_;  // empty: the pull threw
+  std::optional<std::chrono::milliseconds> wake_after_;  // what the source asked for with it
 };
 
 }  // namespace colony::server::http

@@ -1,4 +1,5 @@
 // The half of a session that sends a BodySource.
+#include <algorithm>
 #include <exception>
 #include <utility>
 
@@ -49,7 +50,9 @@ void Session::pull_stream(bool is_first) {
   std::string what = "a stream threw what is not a std::exception";
   try {
     if (is_first) response_.stream->on_ready([waker = waker_] { waker->wake(); });
-    pulled_ = response_.stream->pull(piece_);
+    const BodySource::Pull pulled = response_.stream->pull(piece_);
+    wake_after_ = pulled == BodySource::Pull::kWait ? response_.stream->wake_after() : std::nullopt;
+    pulled_ = pulled;
     return;
   } catch (const std::exception& error) {
     what = error.what();
@@ -61,6 +64,9 @@ void Session::pull_stream(bool is_first) {
 Awaitable<bool> Session::send_stream(Framing framing) {
   waker_ = std::make_shared<Waker>(this);
   bool is_first = true;
+  // Since the last byte, not since the last pull: one that finds nothing is no sign of life to the reader.
+  const std::chrono::milliseconds silence_max(shared_.config.stream_keep_alive_ms);
+  auto silent_since = Connection::Clock::now();
   for (;;) {
     // Before the pull: a wake that comes while it runs must lead to another one.
     woken_ = false;
@@ -78,15 +84,21 @@ Awaitable<bool> Session::send_stream(Framing framing) {
     bool is_sent = co_await send_piece(framing, piece_);
     if (!is_sent) co_return false;
     if (*pulled_ == BodySource::Pull::kEnd) break;
+    if (!piece_.empty()) silent_since = Connection::Clock::now();
     // A stream with a farewell can be taken up again elsewhere; one without goes on to its end, as
     // long as the server waits for it.
     const std::string_view farewell = response_.stream->farewell();
     if (*pulled_ == BodySource::Pull::kWait) {
-      co_await wait_for_stream(farewell);
+      auto until = silent_since + silence_max;
+      if (wake_after_) until = std::min(until, Connection::Clock::now() + *wake_after_);
+      co_await wait_for_stream(farewell, until);
       if (closing_ || connection_->peer_has_closed()) co_return false;
       const bool is_silent = !woken_ && !(draining_ && !farewell.empty());
-      if (is_silent) is_sent = co_await send_piece(framing, response_.stream->keep_alive());
-      if (!is_sent) co_return false;
+      if (is_silent && Connection::Clock::now() >= silent_since + silence_max) {
+        is_sent = co_await send_piece(framing, response_.stream->keep_alive());
+        if (!is_sent) co_return false;
+        silent_since = Connection::Clock::now();
+      }
     }
     if (draining_ && !farewell.empty()) {
       is_sent = co_await send_piece(framing, farewell);
@@ -110,9 +122,8 @@ Awaitable<bool> Session::send_piece(Framing framing, std::string_view piece) {
   co_return io == Io::kDone;
 }
 
-// Until the source wakes, the peer goes, the server drains or it is time for a sign of life.
-Awaitable<void> Session::wait_for_stream(std::string_view farewell) {
-  const auto until = Connection::Clock::now() + std::chrono::milliseconds(shared_.config.stream_keep_alive_ms);
+// Until the source wakes, the peer goes, the server drains or it is time for another pull or a sign of life.
+Awaitable<void> Session::wait_for_stream(std::string_view farewell, Connection::Clock::time_point until) {
   connection_->watch_peer();
   while (!woken_ && !closing_ && !connection_->peer_has_closed() && !(draining_ && !farewell.empty()) &&
          Connection::Clock::now() < until) {

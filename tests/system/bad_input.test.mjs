@@ -46,6 +46,7 @@ const bodies = [
   ['negative cells', spec({ until: { cells: -5 } }), [422], ['/until/cells']],
   ['zero cells', spec({ until: { cells: 0 } }), [422], ['/until/cells']],
   ['absurdly many cells', spec({ until: { cells: 1e15 } }), [422], ['/until/cells']],
+  ['fewer cells than founders', spec({ until: { cells: 4 }, model: { founders: { count: 5, radius_um: 500 } } }), [422], ['/until/cells']],
   ['a negative time', spec({ until: { time_h: -1 } }), [422], ['/until/time_h']],
   ['an absurd time', spec({ until: { time_h: 1e300 } }), [422], ['/until/time_h']],
   ['a negative radius', withModel({ dish: { radius_um: -100 } }), [422], ['/model/dish/radius_um']],

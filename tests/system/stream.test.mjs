@@ -111,6 +111,28 @@ test('the event stream', async (t) => {
     assert.deepEqual(ids(stream), dense(1, (await show(server, id)).last_seq));
   });
 
+  await t.test('shows a pause at once, with and without events', async () => {
+    const { id } = await submit(server, endless(26));
+    const streams = await Promise.all(['', '?kind=progress'].map((query) => openStream(t, server, `/v1/jobs/${id}/events${query}`)));
+    const says = (state) => (stream) => {
+      const last = stream.events.filter(({ event }) => event === 'progress').at(-1);
+      return last !== undefined && JSON.parse(last.data).state === state;
+    };
+    await grown(server, id, 30);
+    for (const stream of streams) await stream.until('progress of a running job', says('running'));
+    await command(server, id, 'pause');
+    const job = await reached(server, id, 'paused');
+    for (const stream of streams) {
+      await stream.until('the pause to be shown', says('paused'));
+      await stream.until('the last seq to be shown', ({ events }) =>
+        JSON.parse(events.findLast(({ event }) => event === 'progress').data).last_seq === job.last_seq);
+      // A paused job is silent: without a wake of its own the stream would go on only with the sign of life.
+      assert.equal(stream.comments, 0);
+      stream.close();
+    }
+    await command(server, id, 'cancel');
+  });
+
   await t.test('of an unknown job is refused', async () => {
     const response = await server.get('/v1/jobs/01890000-0000-7000-8000-000000000000/events', { Accept: 'text/event-stream' });
     assert.equal(response.status, 404);

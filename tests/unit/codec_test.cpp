@@ -1,5 +1,6 @@
 // Job specs: every fault by its pointer, all at once, and the way back.
 #include <algorithm>
+#include <atomic>
 #include <string>
 #include <utility>
 #include <vector>
@@ -21,7 +22,10 @@ using ::testing::HasSubstr;
 Result<JobSpec> decode(const std::string& text) {
   const auto json = parse_json(text);
   if (!json) return json.error();
-  return decode_spec(*json, SpecLimits{1'000'000});
+  auto spec = decode_spec(*json, SpecLimits{1'000'000});
+  if (!spec) return spec;
+  if (const Status placed = check_founders(spec->run, nullptr); !placed) return placed.error();
+  return spec;
 }
 
 std::vector<std::string> pointers(const Result<JobSpec>& result) {
@@ -58,6 +62,7 @@ TEST(Spec, OneFaultIsNamedByItsPointer) {
       {R"({"until": {"cells": 1.5}})", "/until/cells"},
       {R"({"until": {"cells": 1000001}})", "/until/cells"},
       {R"({"until": {"time_h": 0}})", "/until/time_h"},
+      {R"({"until": {"cells": 4}, "model": {"founders": {"count": 5, "radius_um": 500}}})", "/until/cells"},
       {R"({"until": {"time_h": -1}})", "/until/time_h"},
       {R"({"until": {"time_h": 1e300}})", "/until/time_h"},
       {R"({"until": {"time_h": null}})", "/until/time_h"},
@@ -202,6 +207,25 @@ TEST(Spec, AStoredSpecIsNotHeldToLimitsOfToday) {
   JobSpec spec = *decode(R"({"until": {"cells": 1000000}})");
   spec.run.until.cells = 3'000'000;
   EXPECT_TRUE(decode_stored_spec(to_text(encode_spec(spec))));
+}
+
+TEST(Spec, AStoredSpecIsTakenAsItStandsWithoutPlacingFounders) {
+  // 5,000 founders have no room within 30 um, and are more than until.cells: neither is asked again.
+  JobSpec spec = *decode(R"({"until": {"cells": 10}})");
+  spec.run.params.founders.count = 5000;
+  spec.run.params.founders.radius_um = 30.0;
+  const auto stored = decode_stored_spec(to_text(encode_spec(spec)));
+  ASSERT_TRUE(stored);
+  EXPECT_EQ(founder_count(stored->params.founders), 5000u);
+  const Status placed = check_founders(*stored, nullptr);
+  ASSERT_FALSE(placed);
+  EXPECT_EQ(placed.error().fields.at(0).pointer, "/model/founders");
+}
+
+TEST(Spec, CheckingFoundersCanBeStopped) {
+  const auto spec = decode(R"({"until": {"cells": 10}})");
+  const std::atomic<bool> stop{true};
+  EXPECT_THROW((void)check_founders(spec->run, &stop), Stopped);
 }
 
 TEST(Suggestion, OnlyNearNames) {

@@ -126,6 +126,23 @@ TEST(Config, OnlyLoopbackIsListenedOn) {
   EXPECT_THAT(given({"--listen", "0.0.0.0:80"}).error().fields.at(0).message, HasSubstr("tokens and TLS"));
 }
 
+TEST(Config, TheBasePathIsCheckedAndTheDiskLimitsAreRead) {
+  EXPECT_EQ(given({})->config.http.base_path, "");
+  for (const char* right : {"/colony", "/a/b-c_d.e", ""}) {
+    const auto result = given({"--server.base-path", right});
+    ASSERT_TRUE(result) << right;
+    EXPECT_EQ(result->config.http.base_path, right);
+  }
+  for (const char* wrong :
+       {"colony", "/", "/colony/", "//a", "/a//b", "/a/../b", "/.", "/a b", "/a%20", "/a?b", "/\xc3\xbc"}) {
+    EXPECT_THAT(places(given({"--server.base-path", wrong})), ElementsAre("--server.base-path")) << wrong;
+  }
+  const auto disk = given({"--limits.database-bytes-max=1000000", "--limits.free-bytes-min", "5"});
+  ASSERT_TRUE(disk);
+  EXPECT_EQ(disk->config.store.database_bytes_max, 1'000'000u);
+  EXPECT_EQ(disk->config.jobs.free_bytes_min, 5u);
+}
+
 TEST(Config, HelpAndVersion) {
   EXPECT_EQ(given({"--version"})->print, "colonyd 1.2.3\n");
   const std::string help = given({"--help"})->print;

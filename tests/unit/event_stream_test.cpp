@@ -160,6 +160,49 @@ TEST_F(LiveStream, ProgressComesAtMostFiveTimesASecond) {
   EXPECT_EQ(pull_until(http::BodySource::Pull::kWait), "") << "no news, no message";
 }
 
+TEST_F(LiveStream, AChangeOfStateIsSaidAtOnce) {
+  open("progress");
+  pull_until(http::BodySource::Pull::kWait);
+  now += std::chrono::milliseconds(1);
+  jobs.row.state = JobState::kPaused;
+  const std::string paused = pull_until(http::BodySource::Pull::kWait);
+  EXPECT_THAT(paused, StartsWith("event: progress\ndata: {\"state\":\"paused\""));
+  EXPECT_EQ(stream->wake_after(), std::nullopt);
+  EXPECT_EQ(pull_until(http::BodySource::Pull::kWait), "") << "and once";
+}
+
+TEST_F(LiveStream, ProgressThatHadToWaitComesWithoutAnotherWake) {
+  open("progress");
+  pull_until(http::BodySource::Pull::kWait);
+  EXPECT_EQ(stream->wake_after(), std::nullopt) << "nothing is left to say";
+  now += std::chrono::microseconds(50'500);
+  ++jobs.progress.cells;
+  EXPECT_EQ(pull_until(http::BodySource::Pull::kWait), "");
+  EXPECT_EQ(stream->wake_after(), std::chrono::milliseconds(150)) << "149.5 ms, rounded up";
+  now += *stream->wake_after();
+  EXPECT_THAT(pull_until(http::BodySource::Pull::kWait), StartsWith("event: progress\n"));
+  EXPECT_EQ(stream->wake_after(), std::nullopt);
+}
+
+TEST_F(LiveStream, APieceIsOfItsSizeHoweverManyEventsWait) {
+  jobs.stored = SIZE_MAX;
+  const Event sample = jobs.history.front();
+  jobs.history.assign(1000, sample);
+  for (std::size_t i = 0; i < jobs.history.size(); ++i) jobs.history[i].seq = i + 1;
+  open();
+  std::uint64_t seq = 0;
+  for (auto result = http::BodySource::Pull::kMore; result == http::BodySource::Pull::kMore;) {
+    std::string piece;
+    result = stream->pull(piece);
+    EXPECT_LT(piece.size(), api::kPieceBytes + 8 * 1024);
+    for (const std::string& message : split_lines(piece, "\n\n")) {
+      if (message.find("\nid: ") == std::string::npos) continue;
+      EXPECT_THAT(message, HasSubstr("\nid: " + std::to_string(++seq) + "\n"));
+    }
+  }
+  EXPECT_EQ(seq, 1000u);
+}
+
 TEST_F(LiveStream, AJobDeletedUnderItEndsItWithoutEnd) {
   open();
   pull_until(http::BodySource::Pull::kWait);

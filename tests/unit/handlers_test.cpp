@@ -1,4 +1,5 @@
 // The handlers of jobs and of the server itself: Request to Response over a service of fixed answers; no socket.
+#include <algorithm>
 #include <set>
 #include <string>
 #include <vector>
@@ -75,6 +76,66 @@ TEST(Submit, BadBodiesAreProblemsAndStoreNothing) {
       EXPECT_TRUE(fixture.jobs.submitted.empty());
     }
   }
+}
+
+// One endpoint over a context that the test holds.
+http::Response submitted_to(api::Context& context, const std::string& target_query, const std::string& body) {
+  const auto table = api::endpoints();
+  const auto submit =
+      std::find_if(table.begin(), table.end(), [](const api::Endpoint& e) { return e.operation_id == "submitJob"; });
+  http::Request request;
+  request.method = "POST";
+  request.path = "/v1/jobs";
+  request.headers.set("Content-Type", "application/json");
+  if (!target_query.empty()) request.query.emplace_back(target_query, "true");
+  request.body = body;
+  return api::run_endpoint(*submit, context, request);
+}
+
+std::string founders(int count) {
+  return R"({"until": {"cells": 100000}, "model": {"founders": {"count": )" + std::to_string(count) +
+         R"(, "radius_um": 4000}}})";
+}
+
+TEST(Submit, OneAtATimeMayHaveManyFounders) {
+  FakeJobs jobs;
+  api::Context context{jobs, ApiFixture::config(), false, {}, {}, true};  // another one is at it
+  for (const char* query : {"", "dry_run"}) {
+    auto refused = submitted_to(context, query, founders(1001));
+    EXPECT_EQ(refused.status, 503);
+    EXPECT_EQ(json_of(refused)["type"], "urn:colony:problem:busy");
+    EXPECT_NE(header(refused, "Retry-After"), "");
+  }
+  EXPECT_TRUE(jobs.submitted.empty());
+  EXPECT_TRUE(context.places_many) << "the turn of the other one is not taken away";
+  EXPECT_EQ(submitted_to(context, "dry_run", founders(5)).status, 200) << "a small one needs no turn";
+  context.places_many = false;
+  EXPECT_EQ(submitted_to(context, "dry_run", founders(1001)).status, 200);
+  EXPECT_FALSE(context.places_many) << "given back";
+}
+
+TEST(Submit, IsGivenUpWhenTheServerEnds) {
+  ApiFixture fixture;
+  fixture.api().drain();
+  for (const char* target : {"/v1/jobs", "/v1/jobs?dry_run=true"}) {
+    auto response = fixture.post(target, founders(2000));
+    EXPECT_EQ(response.status, 503);
+    EXPECT_EQ(json_of(response)["type"], "urn:colony:problem:unavailable");
+    EXPECT_NE(header(response, "Retry-After"), "");
+  }
+  EXPECT_TRUE(fixture.jobs.submitted.empty());
+  auto image = fixture.get(kJob + "/image");
+  EXPECT_EQ(image.status, 503) << "drawing, too";
+}
+
+TEST(Paths, BeginWithTheBasePath) {
+  api::ApiConfig config = ApiFixture::config();
+  config.base_path = "/colony";
+  ApiFixture fixture(config);
+  EXPECT_EQ(header(fixture.post("/v1/jobs", kSpec), "Location"), "/colony" + kJob);
+  EXPECT_THAT(header(fixture.get("/v1/jobs"), "Link"), HasSubstr("</colony/v1/jobs?cursor="));
+  auto openapi = fixture.get("/openapi.json");
+  EXPECT_EQ(json_of(openapi)["servers"][0]["url"], "/colony");
 }
 
 TEST(Submit, AThousandErrorsAreListedAndAllCounted) {

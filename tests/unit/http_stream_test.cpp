@@ -307,6 +307,36 @@ TEST(HttpStream, ASignOfLifeIsSentAndThenItIsPulledAgain) {
   EXPECT_TRUE(reply.is_complete);
 }
 
+/// Waits twice without ever waking, and asks to be pulled again soon.
+class Impatient : public BodySource {
+ public:
+  Pull pull(std::string& out) override {
+    if (++count_ < 3) return Pull::kWait;
+    out += "third";
+    return Pull::kEnd;
+  }
+  std::optional<std::chrono::milliseconds> wake_after() override { return std::chrono::milliseconds(count_); }
+  std::string_view keep_alive() const override { return ": alive\n\n"; }
+
+ private:
+  int count_ = 0;
+};
+
+TEST(HttpStream, ASourceIsPulledAgainWhenItAskedForIt) {
+  ServerConfig config;
+  config.stream_keep_alive_ms = 3'600'000;  // not by this
+  TestServer server(
+      [](Router& router) {
+        router.add("GET", "/s", [](const Request&) { return streamed(std::make_unique<Impatient>()); });
+      },
+      config);
+  server.run();
+  RawClient client(server.port());
+  const Reply reply = client.ask(get("/s"));
+  EXPECT_EQ(reply.body, "third") << "no sign of life in between";
+  EXPECT_TRUE(reply.is_complete);
+}
+
 TEST(HttpStream, WatchersHoldNoWorker) {
   ServerConfig config;
   config.worker_threads = 1;
