@@ -81,7 +81,7 @@ class LocalJobService final : public JobService {
   std::mutex mutex_;                 // guards everything below
   std::condition_variable changed_;  // work came, a runner left a job, or draining began
   bool draining_ = false;
-  std::uint64_t nudges_ = 0;                               // grows whenever a queued job may have come
+  std::uint64_t nudges_ = 0;  // grows whenever a queued job may have come
   std::uint64_t tickets_ = 0;
   // A job is in at most one of these three.
   std::deque<JobRow> running_before_;                      // `running` in the store, without a runner

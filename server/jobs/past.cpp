@@ -68,9 +68,8 @@ Result<ColonyAt> Past::colony_after(const JobRow& job, std::uint64_t seq) {
   }
   try {
     auto colony = start != nullptr ? std::make_shared<Colony>(*start) : std::make_shared<Colony>(spec->params);
-    const Status folded =
-        for_each_event(store_, &stop_, job.job_key, colony->last_seq(), seq,
-                       [&](const Event& event) { colony->apply(event); });
+    const Status folded = for_each_event(store_, &stop_, job.job_key, colony->last_seq(), seq,
+                                         [&](const Event& event) { colony->apply(event); });
     if (!folded) return folded.error();
     keep(job, colony, spec);
     return ColonyAt{colony, spec, colony->time_h(), colony->digest()};

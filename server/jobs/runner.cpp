@@ -170,9 +170,8 @@ RunEnd Run::grow() {
                               "more than " + std::to_string(env_.config.cells_max) + " cells (limits.cells_max)");
     }
     if (tail_.last_seq >= env_.config.events_max) {
-      return end_from_outside(
-          JobState::kFailed, FinishReason::kLimit,
-          "more than " + std::to_string(env_.config.events_max) + " events (limits.events_max)");
+      return end_from_outside(JobState::kFailed, FinishReason::kLimit,
+                              "more than " + std::to_string(env_.config.events_max) + " events (limits.events_max)");
     }
     if (events_.size() >= kBatchEvents || Clock::now() >= batch_since_ + kBatchAge) append();
   }
