@@ -75,6 +75,7 @@ void LiveJob::ask(Wish wish) {
   Wish now = wish_.load();
   while (now < wish && !wish_.compare_exchange_weak(now, wish)) {
   }
+  if (wish != Wish::kNone) stop_.store(true);
 }
 
 void LiveJob::committed(const JobRow& job) {

@@ -13,6 +13,7 @@
 #include <mutex>
 #include <set>
 
+#include "engine/base/stop.hpp"
 #include "server/jobs/service.hpp"
 
 namespace colony::server {
@@ -37,9 +38,15 @@ class LiveJob {
   enum class Wish : std::uint8_t { kNone, kDrain, kPause, kCancel };
   explicit LiveJob(const JobRow& job);
 
-  /// Asks the runner to stop between two steps. A stronger wish (later in the list) replaces a weaker one.
+  /// Asks the runner to stop, also in the middle of a step. A stronger wish (later in the list) replaces a weaker one; none is
+  /// ever withdrawn.
   void ask(Wish wish);
-  Wish wish() const { return wish_.load(std::memory_order_acquire); }
+  Wish wish() const {
+    (void)stop_.load();  // so that who has seen the flag (polled without ordering) sees the wish too
+    return wish_.load();
+  }
+  /// Set from the first wish on; who has seen it set finds a wish.
+  StopFlag stop_flag() const { return &stop_; }
 
   /// After a commit: `job` as stored.
   void committed(const JobRow& job);
@@ -55,6 +62,7 @@ class LiveJob {
   };
 
   std::atomic<Wish> wish_{Wish::kNone};
+  std::atomic<bool> stop_{false};  // set after wish_
   std::atomic<bool> has_committed_{false};
   const std::optional<double> until_time_h_;  // fixed after construction
   const std::optional<std::uint64_t> until_cells_;

@@ -116,6 +116,10 @@ Status LocalJobService::remove(const std::string& id) {
   const Status removed = store_.delete_job(job->job_key);
   if (!removed) return removed.error();
   past_.forget(job->job_key);
+  {
+    const std::lock_guard lock(mutex_);
+    last_pause_.erase(job->job_key);
+  }
   hub_->announce(job->job_key);
   return Ok{};
 }

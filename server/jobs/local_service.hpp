@@ -48,6 +48,7 @@ class LocalJobService final : public JobService {
  private:
   using Clock = std::chrono::steady_clock;
   struct Stalled {
+    std::uint64_t ticket = 0;  // never used twice: tells this stop from a later one of the same job
     std::chrono::milliseconds pause{0};
     Clock::time_point retry_at;
   };
@@ -55,10 +56,12 @@ class LocalJobService final : public JobService {
   void run_loop();
   /// The next job with its live half, registered; nullptr in `second` if there is none.
   Result<std::pair<JobRow, std::shared_ptr<LiveJob>>> take();
-  void stall(const JobRow& job, bool made_progress);
+  /// The runner of `live` has written its last and gives the job back.
+  void leave(const JobRow& job, const std::shared_ptr<LiveJob>& live, RunEnd end);
   void retry_loop();
   /// Puts a stalled job back to work if the store allows it; false: not yet.
-  bool retry(std::int64_t job_key);
+  bool retry(std::int64_t job_key, std::uint64_t ticket);
+  bool is_stalled(std::int64_t job_key, std::uint64_t ticket) const;  // mutex_ is held
   void nudge_runners();
   JobView view_of(JobRow job);
   Result<Commanded> command(const std::string& id, JobCommand command, LiveJob::Wish wish);
@@ -72,15 +75,18 @@ class LocalJobService final : public JobService {
   Past past_;                                                 // synchronises itself
   const RunnerEnvironment environment_;
 
-  // Held from taking a job to registering it: a command that finds a job running then finds its live half too.
+  // Held from taking a job to registering it: a command that finds a job running then finds its live half too, and a retry that
+  // finds it running without one knows that nobody has it. A runner that leaves a job never takes it: take() waits for that.
   std::mutex take_mutex_;            // before mutex_ where both are held
   std::mutex mutex_;                 // guards everything below
   std::condition_variable changed_;  // work came, a runner left a job, or draining began
   bool draining_ = false;
-  std::uint64_t nudges_ = 0;                               // grows whenever a queued job may have come
+  std::uint64_t nudges_ = 0;  // grows whenever a queued job may have come
+  std::uint64_t tickets_ = 0;
+  // A job is in at most one of these three.
   std::deque<JobRow> running_before_;                      // `running` in the store, without a runner
-  std::map<std::int64_t, std::shared_ptr<LiveJob>> live_;  // at most concurrent_max
-  std::map<std::int64_t, Stalled> stalled_;                // stopped by the store
+  std::map<std::int64_t, std::shared_ptr<LiveJob>> live_;  // has a runner; at most concurrent_max
+  std::map<std::int64_t, Stalled> stalled_;                // stopped by the store, to be tried again
   std::map<std::int64_t, std::chrono::milliseconds>
       last_pause_;  // of jobs stopped by the store before, until they progress
   std::vector<std::thread> threads_;

@@ -5,7 +5,7 @@
 #include <string>
 #include <utility>
 
-#include "engine/base/check.hpp"
+#include "engine/base/stop.hpp"
 
 namespace colony::server {
 namespace {
@@ -15,18 +15,25 @@ constexpr std::size_t kSeriesMax = 32;
 
 /// Calls `use(event)` for every event with after < seq <= last, page by page.
 template <class Use>
-Status for_each_event(Store& store, std::int64_t job_key, std::uint64_t after, std::uint64_t last, Use use) {
+Status for_each_event(Store& store, StopFlag stop, std::int64_t job_key, std::uint64_t after, std::uint64_t last,
+                      Use use) {
   EventFilter filter;
   filter.after = after;
   while (filter.after < last) {
+    throw_if_stopped(stop);
     const auto page = store.read_events(job_key, filter, std::min<std::uint64_t>(kPage, last - filter.after));
     if (!page) return page.error();
     if (page->empty()) return Error{ErrorCode::kInternal, "the stored history ends before its last event"};
-    for (const Event& event : *page) use(event);
+    for (const Event& event : *page) {
+      throw_if_stopped(stop);
+      use(event);
+    }
     filter.after = page->back().seq;
   }
   return Ok{};
 }
+
+Error stopped() { return {ErrorCode::kUnavailable, "the server is shutting down"}; }
 
 Error does_not_fold(const JobRow& job, const std::exception& error) {
   return {ErrorCode::kInternal, "the stored history of job " + job.id + " does not fold: " + error.what()};
@@ -34,8 +41,8 @@ Error does_not_fold(const JobRow& job, const std::exception& error) {
 
 }  // namespace
 
-Past::Past(Store& store, const SpecDecoder& decode, std::size_t colonies_max)
-    : store_(store), decode_(decode), colonies_max_(std::max<std::size_t>(colonies_max, 1)) {}
+Past::Past(Store& store, const SpecDecoder& decode, std::size_t colonies_max, std::uint64_t cells_max)
+    : store_(store), decode_(decode), colonies_max_(colonies_max), cells_max_(cells_max) {}
 
 Result<ColonyAt> Past::colony_after(const JobRow& job, std::uint64_t seq) {
   std::shared_ptr<const Colony> start;
@@ -61,15 +68,30 @@ Result<ColonyAt> Past::colony_after(const JobRow& job, std::uint64_t seq) {
   }
   try {
     auto colony = start != nullptr ? std::make_shared<Colony>(*start) : std::make_shared<Colony>(spec->params);
-    const Status folded =
-        for_each_event(store_, job.job_key, colony->last_seq(), seq, [&](const Event& event) { colony->apply(event); });
+    const Status folded = for_each_event(store_, &stop_, job.job_key, colony->last_seq(), seq,
+                                         [&](const Event& event) { colony->apply(event); });
     if (!folded) return folded.error();
-    const std::lock_guard lock(mutex_);
-    colonies_.push_front({job.job_key, seq, colony, spec});
-    if (colonies_.size() > colonies_max_) colonies_.pop_back();
+    keep(job, colony, spec);
     return ColonyAt{colony, spec, colony->time_h(), colony->digest()};
+  } catch (const Stopped&) {
+    return stopped();
   } catch (const std::exception& error) {
     return does_not_fold(job, error);
+  }
+}
+
+void Past::keep(const JobRow& job, const std::shared_ptr<const Colony>& colony,
+                const std::shared_ptr<const RunSpec>& spec) {
+  const std::uint64_t seq = colony->last_seq();
+  const std::uint64_t cells = colony->cells().size();
+  const std::lock_guard lock(mutex_);
+  const auto same = [&](const KeptColony& kept) { return kept.job_key == job.job_key && kept.seq == seq; };
+  if (cells > cells_max_ || colonies_max_ == 0 || std::any_of(colonies_.begin(), colonies_.end(), same)) return;
+  colonies_.push_front({job.job_key, seq, colony, spec});
+  kept_cells_ += cells;
+  while (colonies_.size() > colonies_max_ || kept_cells_ > cells_max_) {
+    kept_cells_ -= colonies_.back().colony->cells().size();
+    colonies_.pop_back();
   }
 }
 
@@ -94,17 +116,20 @@ Result<std::vector<SeriesRow>> Past::series(const JobRow& job, std::size_t point
     Colony colony(spec->params);
     std::optional<SeriesRow> measured;  // of the colony as it is now
     const auto add_row = [&] {
+      throw_if_stopped(&stop_);
       if (!measured) measured = measure_series(colony, 0.0);
       measured->time_h = time_of(rows.size());
       rows.push_back(*measured);
     };
-    const Status folded = for_each_event(store_, job.job_key, 0, job.last_seq, [&](const Event& event) {
+    const Status folded = for_each_event(store_, &stop_, job.job_key, 0, job.last_seq, [&](const Event& event) {
       while (rows.size() < count && time_of(rows.size()) < event.time_h) add_row();
       colony.apply(event);
       if (event.kind() != EventKind::kFinished) measured.reset();
     });
     if (!folded) return folded.error();
     while (rows.size() < count) add_row();
+  } catch (const Stopped&) {
+    return stopped();
   } catch (const std::exception& error) {
     return does_not_fold(job, error);
   }
@@ -116,7 +141,10 @@ Result<std::vector<SeriesRow>> Past::series(const JobRow& job, std::size_t point
 
 void Past::forget(std::int64_t job_key) {
   const std::lock_guard lock(mutex_);
-  colonies_.remove_if([&](const KeptColony& kept) { return kept.job_key == job_key; });
+  colonies_.remove_if([&](const KeptColony& kept) {
+    if (kept.job_key == job_key) kept_cells_ -= kept.colony->cells().size();
+    return kept.job_key == job_key;
+  });
   series_.remove_if([&](const KeptSeries& kept) { return kept.job_key == job_key; });
 }
 

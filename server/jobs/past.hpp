@@ -1,9 +1,12 @@
 // past: colonies and growth curves at past moments, folded from the stored events and kept for the next question.
+// Promise: what is kept has at most colonies_max colonies of cells_max cells together; a colony that is larger alone is not kept.
 // Method:  a fold starts from the nearest kept earlier fold of the same job, else from the first event.
-// Errors:  as the store's; kInternal when a stored history does not fold (its digest chain is checked on the way).
+// Errors:  as the store's; kUnavailable after stop() for what is not kept; kInternal when a stored history does not fold (its digest chain is checked on the way).
 // Threads: every function from any thread; two threads may fold the same moment, and either answer is kept.
 #pragma once
 
+#include <atomic>
+#include <cstdint>
 #include <list>
 #include <memory>
 #include <mutex>
@@ -15,7 +18,10 @@ namespace colony::server {
 
 class Past {
  public:
-  Past(Store& store, const SpecDecoder& decode, std::size_t colonies_max);
+  Past(Store& store, const SpecDecoder& decode, std::size_t colonies_max, std::uint64_t cells_max);
+
+  /// Ends every fold under way and to come.
+  void stop() { stop_.store(true); }
 
   /// The colony after event `seq` (0: before the first).
   Result<ColonyAt> colony_after(const JobRow& job, std::uint64_t seq);
@@ -25,6 +31,8 @@ class Past {
   void forget(std::int64_t job_key);
 
  private:
+  void keep(const JobRow& job, const std::shared_ptr<const Colony>& colony, const std::shared_ptr<const RunSpec>& spec);
+
   struct KeptColony {
     std::int64_t job_key;
     std::uint64_t seq;
@@ -41,8 +49,11 @@ class Past {
   Store& store_;  // fixed after construction
   const SpecDecoder& decode_;
   const std::size_t colonies_max_;
+  const std::uint64_t cells_max_;
+  std::atomic<bool> stop_{false};
   std::mutex mutex_;                // guards everything below
   std::list<KeptColony> colonies_;  // used last: first; at most colonies_max_
+  std::uint64_t kept_cells_ = 0;    // in colonies_; at most cells_max_
   std::list<KeptSeries> series_;    // used last: first; at most kSeriesMax
 };
 

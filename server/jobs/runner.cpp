@@ -116,9 +116,8 @@ RunEnd Run::begin() {
   if (!spec)
     return fail_as_stored("internal", FinishReason::kInternal,
                           "the stored spec cannot be used: " + spec.error().message);
-  const FounderParams& founders = spec->params.founders;
-  founders_ = founders.positions_um.empty() ? static_cast<std::uint64_t>(founders.count) : founders.positions_um.size();
-  simulator_ = std::make_unique<Simulator>(std::move(*spec));
+  founders_ = founder_count(spec->params.founders);
+  simulator_ = std::make_unique<Simulator>(std::move(*spec), live_->stop_flag());
   if (tail_.last_seq > 0 && !replay()) return stop(live_->wish());
   return grow();
 }
@@ -153,9 +152,12 @@ RunEnd Run::grow() {
     if (const LiveJob::Wish wish = live_->wish(); wish != LiveJob::Wish::kNone) return stop(wish);
     measure_if_due();
     std::optional<Event> event;
-    {
+    try {
       const FailureContext context("deciding event " + std::to_string(tail_.last_seq + 1) + " of job " + tail_.id);
       event = simulator_->step();
+    } catch (const Stopped&) {
+      CHECK(live_->wish() != LiveJob::Wish::kNone);  // else this loop would turn for ever
+      continue;
     }
     CHECK(event.has_value());  // `finished` comes first, and ends this loop
     const bool finished = event->kind() == EventKind::kFinished;
@@ -165,12 +167,11 @@ RunEnd Run::grow() {
     }
     if (tail_.cell_count > env_.config.cells_max) {
       return end_from_outside(JobState::kFailed, FinishReason::kLimit,
-                              "more than " + std::to_string(env_.config.cells_max) + " cells (limits.cells_per_job)");
+                              "more than " + std::to_string(env_.config.cells_max) + " cells (limits.cells_max)");
     }
     if (tail_.last_seq >= env_.config.events_max) {
-      return end_from_outside(
-          JobState::kFailed, FinishReason::kLimit,
-          "more than " + std::to_string(env_.config.events_max) + " events (limits.events_per_job)");
+      return end_from_outside(JobState::kFailed, FinishReason::kLimit,
+                              "more than " + std::to_string(env_.config.events_max) + " events (limits.events_max)");
     }
     if (events_.size() >= kBatchEvents || Clock::now() >= batch_since_ + kBatchAge) append();
   }

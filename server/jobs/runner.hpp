@@ -1,4 +1,4 @@
-// runner: grows one colony from its stored events to its end, or until it is asked to stop.
+// runner: grows one colony from its stored events to its end, or until it is asked to stop, which it does in the middle of a step too.
 // Promise: what was stored before is folded and its digest checked before anything is decided; events reach the store in order;
 //          the terminal state and `finished` are one transaction.
 // Errors:  a bug or a wrong spec fails the job (reason "internal" with the replay hint), never the server.

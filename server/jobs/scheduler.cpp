@@ -13,12 +13,13 @@ LocalJobService::LocalJobService(Store& store, JobsConfig config, SpecDecoder de
     : store_(store),
       config_(config),
       decode_(std::move(decode)),
-      past_(store_, decode_, config_.cached_colonies_max),
+      past_(store_, decode_, config_.cached_colonies_max, config_.cached_cells_max),
       environment_{store_, config_, decode_, *hub_} {}
 
 LocalJobService::~LocalJobService() { drain(); }
 
 Status LocalJobService::start() {
+  if (config_.concurrent_max < 1) return Error{ErrorCode::kInvalid, "jobs.concurrent_max must be 1 or more"};
   auto running = store_.running_jobs();
   if (!running) return running.error();
   JobFilter paused;
@@ -37,8 +38,10 @@ Status LocalJobService::start() {
   const std::lock_guard lock(mutex_);
   if (draining_ || !threads_.empty()) return Error{ErrorCode::kConflict, "the service was started before"};
   for (JobRow& job : *running) running_before_.push_back(std::move(job));
-  for (const std::int64_t job_key : storage_paused) stalled_[job_key] = {std::chrono::milliseconds(0), Clock::now()};
-  for (std::size_t i = 0; i < std::max<std::size_t>(config_.concurrent_max, 1); ++i) {
+  for (const std::int64_t job_key : storage_paused) {
+    stalled_[job_key] = {++tickets_, std::chrono::milliseconds(0), Clock::now()};
+  }
+  for (std::size_t i = 0; i < config_.concurrent_max; ++i) {
     threads_.emplace_back([this] { run_loop(); });
   }
   threads_.emplace_back([this] { retry_loop(); });
@@ -46,6 +49,7 @@ Status LocalJobService::start() {
 }
 
 void LocalJobService::drain() {
+  past_.stop();
   std::vector<std::thread> threads;
   {
     const std::lock_guard take_lock(take_mutex_);  // so that no job is between store and live_
@@ -85,7 +89,11 @@ Result<std::pair<JobRow, std::shared_ptr<LiveJob>>> LocalJobService::take() {
   }
   if (!job) return std::pair<JobRow, std::shared_ptr<LiveJob>>{};
   auto live = std::make_shared<LiveJob>(*job);
-  const std::lock_guard lock(mutex_);
+  std::unique_lock lock(mutex_);
+  // Between the moment a runner stores `paused` and the moment it leaves, a person may resume the job. That gap has no end to wait
+  // for but the runner's own few lines.
+  changed_.wait(lock, [&] { return !live_.contains(job->job_key); });
+  stalled_.erase(job->job_key);  // resumed by a person before its retry came
   live_[job->job_key] = live;
   return std::pair{std::move(*job), std::move(live)};
 }
@@ -111,27 +119,33 @@ void LocalJobService::run_loop() {
     }
     const auto& [job, live] = *taken;
     hub_->announce(job.job_key);
-    const RunEnd end = run_job(environment_, job, live);
-    if (end == RunEnd::kStorage) stall(job, live->has_committed());
-    {
-      const std::lock_guard lock(mutex_);
-      live_.erase(job.job_key);
-      if (end != RunEnd::kStorage) last_pause_.erase(job.job_key);
-    }
+    leave(job, live, run_job(environment_, job, live));
     changed_.notify_all();
     hub_->announce(job.job_key);
   }
 }
 
-void LocalJobService::stall(const JobRow& job, bool made_progress) {
-  // May fail as everything else does now; then view_of() tells it, and the next try starts from `running`.
-  (void)store_.set_state(job.job_key, {JobState::kRunning}, JobState::kPaused, "storage",
-                         "the database refused events");
+void LocalJobService::leave(const JobRow& job, const std::shared_ptr<LiveJob>& live, RunEnd end) {
+  if (end == RunEnd::kStorage) {
+    // May fail as everything else does now; then view_of() tells it, and the next try starts from `running`.
+    (void)store_.set_state(job.job_key, {JobState::kRunning}, JobState::kPaused, "storage",
+                           "the database refused events");
+  }
   const std::lock_guard lock(mutex_);
+  if (const auto found = live_.find(job.job_key); found != live_.end() && found->second == live) live_.erase(found);
+  if (end != RunEnd::kStorage) {
+    last_pause_.erase(job.job_key);
+    return;
+  }
   const std::chrono::milliseconds first(config_.storage_retry_ms);
   std::chrono::milliseconds& pause = last_pause_[job.job_key];
-  pause = made_progress || pause.count() == 0 ? first : std::min(2 * pause, kPauseDoublings * first);
-  stalled_[job.job_key] = {pause, Clock::now() + pause};
+  pause = live->has_committed() || pause.count() == 0 ? first : std::min(2 * pause, kPauseDoublings * first);
+  stalled_[job.job_key] = {++tickets_, pause, Clock::now() + pause};
+}
+
+bool LocalJobService::is_stalled(std::int64_t job_key, std::uint64_t ticket) const {
+  const auto found = stalled_.find(job_key);
+  return found != stalled_.end() && found->second.ticket == ticket;
 }
 
 void LocalJobService::retry_loop() {
@@ -144,23 +158,27 @@ void LocalJobService::retry_loop() {
       changed_.wait(lock);
       continue;
     }
-    if (Clock::now() < next->second.retry_at) {
-      changed_.wait_until(lock, next->second.retry_at);
+    if (const Clock::time_point retry_at = next->second.retry_at; Clock::now() < retry_at) {
+      changed_.wait_until(lock, retry_at);  // a copy: the entry may go while this waits
       continue;
     }
     const std::int64_t job_key = next->first;
+    const std::uint64_t ticket = next->second.ticket;
     lock.unlock();
-    const bool back = retry(job_key);
+    const bool back = retry(job_key, ticket);
     lock.lock();
-    if (back) {
-      stalled_.erase(job_key);
-      ++nudges_;
-    } else {
-      const std::chrono::milliseconds first(config_.storage_retry_ms);
-      Stalled& stalled = stalled_[job_key];
-      stalled.pause = stalled.pause.count() == 0 ? first : std::min(2 * stalled.pause, kPauseDoublings * first);
-      stalled.retry_at = Clock::now() + stalled.pause;
+    // Meanwhile a runner may have taken the job, and even have been stopped by the store again: that stop stays.
+    if (is_stalled(job_key, ticket)) {
+      if (back) {
+        stalled_.erase(job_key);
+      } else {
+        const std::chrono::milliseconds first(config_.storage_retry_ms);
+        Stalled& stalled = stalled_[job_key];
+        stalled.pause = stalled.pause.count() == 0 ? first : std::min(2 * stalled.pause, kPauseDoublings * first);
+        stalled.retry_at = Clock::now() + stalled.pause;
+      }
     }
+    if (back) ++nudges_;
     lock.unlock();
     changed_.notify_all();
     hub_->announce(job_key);
@@ -168,14 +186,20 @@ void LocalJobService::retry_loop() {
   }
 }
 
-bool LocalJobService::retry(std::int64_t job_key) {
-  const auto job = store_.find_job(job_key);
+bool LocalJobService::retry(std::int64_t job_key, std::uint64_t ticket) {
+  auto job = store_.find_job(job_key);
   if (!job) return job.error().code == ErrorCode::kNotFound;
   if (is_terminal(job->state)) return true;
   if (!store_.check_writable(config_.free_bytes_min)) return false;
   if (job->state == JobState::kRunning) {
+    // Stranded, or taken by a runner since: only without a taking under way do the row and the ticket tell which.
+    const std::lock_guard take_lock(take_mutex_);
+    job = store_.find_job(job_key);
+    if (!job) return false;
     const std::lock_guard lock(mutex_);
-    running_before_.push_back(*job);
+    if (job->state != JobState::kRunning || !is_stalled(job_key, ticket)) return true;
+    stalled_.erase(job_key);
+    running_before_.push_back(std::move(*job));
     return true;
   }
   const auto resumed =

@@ -23,8 +23,9 @@ struct JobsConfig {
   std::size_t queued_max = 1000;
   std::uint64_t cells_max = 1'000'000;     // per job; beyond: failed, reason "limit"
   std::uint64_t events_max = 50'000'000;   // per job; beyond: failed, reason "limit"
-  std::size_t cached_colonies_max = 16;    // folded colonies kept for pictures and tables
-  std::int64_t command_wait_ms = 10'000;   // how long cancel and pause wait for the runner; then the view as it is
+  std::size_t cached_colonies_max = 16;    // folded colonies kept for pictures and tables,
+  std::uint64_t cached_cells_max = 2'000'000;  // and the cells of them all; a larger colony is served but not kept
+  std::int64_t command_wait_ms = 1'000;    // how long cancel and pause wait for the runner; then the view as it is
   std::int64_t storage_retry_ms = 1'000;   // first pause after a storage error; doubles up to 64 times this
   std::uint64_t free_bytes_min = 16'777'216;   // a job stopped by the disk goes on only with this much free
 };
@@ -62,7 +63,8 @@ class JobService {
 
   /// Recovers jobs that were running when the process died, then starts the runners.
   virtual Status start() = 0;
-  /// Stops taking jobs, stops runners between two events (jobs stay `running` in the store and go on at the next start), flushes.
+  /// Stops taking jobs, stops runners at once (jobs stay `running` in the store and go on at the next start), ends questions about
+  /// the past (kUnavailable, unless the answer is kept), flushes.
   virtual void drain() = 0;
 
   struct Submitted { JobView view; bool created = true; };
@@ -82,6 +84,7 @@ class JobService {
   virtual Result<std::vector<Event>> events(const std::string& id, const EventFilter& filter, std::size_t limit) = 0;
   virtual Result<std::vector<LogRow>> log(const std::string& id, std::int64_t after_index, std::size_t limit) = 0;
   /// Events with time_h <= at_h (all stored ones if none). Beyond a live job's time: kNotReached, parameter "at_h".
+  /// Long for a long history; kUnavailable when drain() comes meanwhile. series() likewise.
   virtual Result<ColonyAt> colony_at(const std::string& id, std::optional<double> at_h) = 0;
   /// `points` rows in equal steps from 0 to the end (values after the last event <= t).
   virtual Result<std::vector<SeriesRow>> series(const std::string& id, std::size_t points) = 0;

@@ -1,5 +1,5 @@
 // data_dir: the folder DATA: made 0700, its files 0600, and one process at a time.
-// Promise: while a DataDir lives, no other process (nor another DataDir of this one) holds the same folder.
+// Promise: a folder that was made is on disk, up to the first parent that was there before; while a DataDir lives, no other process (nor another DataDir of this one) holds the same folder.
 #pragma once
 
 #include <cstdint>
@@ -19,6 +19,8 @@ class DataDir {
   DataDir& operator=(const DataDir&) = delete;
 
   std::string database_path() const { return path_ + "/colony.db"; }
+  /// Puts the names of the files inside on disk (their bytes are their writers' affair).
+  Status sync() const;
   /// Bytes an ordinary process can still write on its disk.
   Result<std::uint64_t> free_bytes() const;
 

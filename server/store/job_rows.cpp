@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "engine/base/check.hpp"
 #include "engine/base/version.hpp"
 #include "server/store/identity.hpp"
 
@@ -107,6 +108,14 @@ std::vector<std::uint64_t> count_job_rows(Connection& connection) {
     if (state) counts[static_cast<std::size_t>(*state)] = static_cast<std::uint64_t>(row.integer(1));
   }
   return counts;
+}
+
+std::uint64_t count_queued_rows(Connection& connection) {
+  Statement& row = connection.prepared("SELECT count(*) FROM job WHERE deleted = 0 AND state = 'queued'");
+  CHECK(row.step());  // an aggregate has its row
+  const auto count = static_cast<std::uint64_t>(row.integer(0));
+  row.reset();
+  return count;
 }
 
 std::int64_t insert_job_row(Connection& connection, const NewJob& job) {

@@ -21,6 +21,8 @@ std::optional<JobRow> oldest_queued_row(Connection& connection);
 std::vector<JobRow> list_job_rows(Connection& connection, const JobFilter& filter, std::int64_t before,
                                   std::size_t limit);
 std::vector<std::uint64_t> count_job_rows(Connection& connection);
+/// Reads the queued ones only, whatever the number of ended ones.
+std::uint64_t count_queued_rows(Connection& connection);
 
 /// A new queued job; returns its key.
 std::int64_t insert_job_row(Connection& connection, const NewJob& job);

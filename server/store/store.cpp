@@ -13,9 +13,14 @@ namespace {
 constexpr std::size_t kReaders = 4;
 constexpr std::int64_t kSweepSeqs = 1000;  // one step of deleting a history: a few ms
 constexpr std::uint64_t kPageBytes = 4096;
+constexpr std::uint64_t kDatabaseBytesMin = 262'144;  // the empty tables, and some room to refuse from
 }  // namespace
 
 Result<std::unique_ptr<Store>> Store::open(const StoreConfig& config) {
+  if (config.database_bytes_max > 0 && config.database_bytes_max < kDatabaseBytesMin) {
+    return Error{ErrorCode::kInvalid,
+                 "database_bytes_max must be 0 (no bound) or at least " + std::to_string(kDatabaseBytesMin)};
+  }
   auto dir = DataDir::open(config.data_dir);
   if (!dir) return dir.error();
   try {
@@ -23,9 +28,10 @@ Result<std::unique_ptr<Store>> Store::open(const StoreConfig& config) {
     auto connection = std::make_unique<Connection>(path, Connection::Access::kWriter);
     prepare_database(*connection);
     if (config.database_bytes_max > 0) {
-      const std::uint64_t pages = std::max<std::uint64_t>(config.database_bytes_max / kPageBytes, 1);
+      const std::uint64_t pages = config.database_bytes_max / kPageBytes;
       connection->execute("PRAGMA max_page_count = " + std::to_string(pages));
     }
+    if (const Status kept = (*dir)->sync(); !kept) return kept.error();
     return std::unique_ptr<Store>(new SqliteStore(config, std::move(*dir), std::move(connection)));
   } catch (const IncompatibleDatabase& error) {
     return Error{ErrorCode::kStorage, error.what()};

@@ -24,7 +24,7 @@ struct StoreConfig {
   std::size_t batch_rows_max = 1000;        // a write batch closes at this many rows,
   std::int64_t batch_wait_ms = 50;          // this age, or at once when a request waits
   std::size_t queued_events_max = 20'000;   // a full queue makes append_events wait
-  std::uint64_t database_bytes_max = 0;     // of colony.db; beyond: kStorage. 0: as much as the disk holds
+  std::uint64_t database_bytes_max = 0;     // of colony.db; beyond: kStorage. 0: as much as the disk holds; else at least 256 KiB
 };
 
 struct JobFilter {
@@ -56,7 +56,8 @@ struct EventBatch {
 class Store {
  public:
   /// Opens or creates DATA (0700) and its database, takes the lock file, migrates the schema by user_version.
-  /// Errors: kConflict when another process holds the lock, kStorage otherwise.
+  /// What it made is on disk when it returns, the folders too.
+  /// Errors: kInvalid for a config that cannot be meant, kConflict when another process holds the lock, kStorage otherwise.
   static Result<std::unique_ptr<Store>> open(const StoreConfig& config);
   virtual ~Store() = default;
 

@@ -96,7 +96,7 @@ Result<Store::Submitted> SqliteStore::create_job(const NewJob& job, std::size_t 
         return Submitted{std::move(*same), false};
       }
     }
-    const auto queued = count_job_rows(connection)[static_cast<std::size_t>(JobState::kQueued)];
+    const std::uint64_t queued = count_queued_rows(connection);
     if (queued >= queued_max) {
       return Error{ErrorCode::kBusy,
                    std::to_string(queued) + " jobs are queued already; the limit is " + std::to_string(queued_max)};

@@ -161,13 +161,21 @@ bool Writer::try_batch(std::span<WriteTask> tasks, std::vector<Status>& results)
     connection_.execute("COMMIT");
     return true;
   } catch (const DbError& error) {
-    try {
-      if (connection_.in_transaction()) connection_.execute("ROLLBACK");
-    } catch (const DbError&) {
-      // Nothing was committed either way; the next BEGIN reports what is wrong with the connection.
-    }
+    undo_batch();
     results.assign(tasks.size(), Status(to_error(error)));
     return false;
+  } catch (const std::exception& error) {  // memory, say: not the end of the process that holds everybody's jobs
+    undo_batch();
+    results.assign(tasks.size(), Status(Error{ErrorCode::kStorage, error.what()}));
+    return false;
+  }
+}
+
+void Writer::undo_batch() {
+  try {
+    if (connection_.in_transaction()) connection_.execute("ROLLBACK");
+  } catch (const std::exception&) {
+    // Nothing was committed either way; the next BEGIN reports what is wrong with the connection.
   }
 }
 

@@ -60,6 +60,7 @@ class Writer {
   std::vector<WriteTask> next_batch(std::unique_lock<std::mutex>& lock);
   void commit_batch(std::vector<WriteTask>& tasks);
   bool try_batch(std::span<WriteTask> tasks, std::vector<Status>& results);
+  void undo_batch();
   void checkpoint_if_long();
   bool sweep_once();
 

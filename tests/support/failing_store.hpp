@@ -1,9 +1,12 @@
-// failing_store: a real store whose appends can be made to fail, as on a full disk, and healed again.
+// failing_store: a real store whose appends can be made to fail, as on a full disk, and healed again, and whose calls can be held
+// up at chosen moments. Hooks run on the calling thread; set them before the service starts.
 #pragma once
 
 #include <atomic>
+#include <condition_variable>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <utility>
 #include <vector>
@@ -12,6 +15,31 @@
 
 namespace colony::tests {
 
+/// A place where one thread waits until another lets it pass.
+class Gate {
+ public:
+  void pass() {
+    std::unique_lock lock(mutex_);
+    reached_ = true;
+    changed_.notify_all();
+    changed_.wait(lock, [&] { return open_; });
+  }
+  void wait_until_reached() {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return reached_; });
+  }
+  void open() {
+    const std::lock_guard lock(mutex_);
+    open_ = true;
+    changed_.notify_all();
+  }
+
+ private:
+  std::mutex mutex_;  // guards everything below
+  std::condition_variable changed_;
+  bool reached_ = false, open_ = false;
+};
+
 class FailingStore final : public server::Store {
  public:
   using JobRow = server::JobRow;
@@ -19,6 +47,11 @@ class FailingStore final : public server::Store {
 
   std::atomic<int> appends_until_failure{-1};  // so many appends succeed, then every one fails; negative: none fails
   std::string engine_version_seen;             // not empty: in every row found by key; set before the service starts
+  std::atomic<int> event_reads{0};             // calls of read_events
+  std::function<void()> before_find;           // of a row by its key
+  std::function<void()> before_read_events;
+  std::function<void(server::JobState, const std::string& reason)> after_set_state;  // that succeeded
+  std::function<void()> after_take;                                                  // of a queued job
   void heal() { appends_until_failure = -1; }
 
   void append_events(server::EventBatch batch, std::function<void(const Status&)> committed) override {
@@ -41,6 +74,7 @@ class FailingStore final : public server::Store {
     return real_->check_writable(free_bytes_min);
   }
   Result<JobRow> find_job(std::int64_t job_key) override {
+    if (before_find) before_find();
     auto job = real_->find_job(job_key);
     if (job && !engine_version_seen.empty()) job->engine_version = engine_version_seen;
     return job;
@@ -56,10 +90,16 @@ class FailingStore final : public server::Store {
     return real_->list_jobs(filter, limit, cursor);
   }
   Result<std::vector<std::uint64_t>> count_jobs() override { return real_->count_jobs(); }
-  Result<std::optional<JobRow>> take_queued_job() override { return real_->take_queued_job(); }
+  Result<std::optional<JobRow>> take_queued_job() override {
+    auto taken = real_->take_queued_job();
+    if (taken && *taken && after_take) after_take();
+    return taken;
+  }
   Result<JobRow> set_state(std::int64_t job_key, const std::vector<server::JobState>& from, server::JobState to,
                            const std::string& reason, const std::string& detail) override {
-    return real_->set_state(job_key, from, to, reason, detail);
+    auto set = real_->set_state(job_key, from, to, reason, detail);
+    if (set && after_set_state) after_set_state(to, reason);
+    return set;
   }
   Result<Commanded> command_job(std::int64_t job_key, server::JobCommand command) override {
     return real_->command_job(job_key, command);
@@ -69,6 +109,8 @@ class FailingStore final : public server::Store {
   Status flush() override { return real_->flush(); }
   Result<std::vector<Event>> read_events(std::int64_t job_key, const server::EventFilter& filter,
                                          std::size_t limit) override {
+    ++event_reads;
+    if (before_read_events) before_read_events();
     return real_->read_events(job_key, filter, limit);
   }
   Result<std::uint64_t> seq_at(std::int64_t job_key, double at_h) override { return real_->seq_at(job_key, at_h); }

@@ -8,7 +8,9 @@
 
 #include <gtest/gtest.h>
 
+#include "server/store/connection.hpp"
 #include "server/store/store.hpp"
+#include "server/store/writer.hpp"
 #include "tests/support/sample_events.hpp"
 #include "tests/support/temp_dir.hpp"
 
@@ -232,6 +234,30 @@ TEST(StoreFull, AnErrorLeavesTheDataAsBefore) {
   ASSERT_TRUE(store);
   EXPECT_TRUE((*store)->check_writable(1));
   EXPECT_TRUE(append(**store, sample_batch(job_key, stored + 1, 100)));
+}
+
+TEST(WriterTasks, AnExceptionFailsItsTaskAlone) {
+  const TempDir dir;
+  Connection connection(dir.path() + "/plain.db", Connection::Access::kWriter);
+  connection.execute("CREATE TABLE number (value INTEGER)");
+  const auto insert = [](Connection& to) -> Status {
+    to.execute("INSERT INTO number VALUES (1)");
+    return Ok{};
+  };
+  {
+    Writer writer(connection, {1000, std::chrono::milliseconds(50), 1000},
+                  [](Connection&) -> bool { throw std::runtime_error("a sweep"); });
+    const Status failed = writer.request([&](Connection& to) -> Status {
+      (void)insert(to);
+      throw std::bad_alloc();
+    });
+    ASSERT_FALSE(failed);
+    EXPECT_EQ(failed.error().code, ErrorCode::kInternal);
+    EXPECT_TRUE(writer.request(insert));
+  }
+  Statement count = connection.prepare_once("SELECT count(*) FROM number");
+  ASSERT_TRUE(count.step());
+  EXPECT_EQ(count.integer(0), 1);
 }
 
 TEST(StoreWritable, AsksForFreeSpace) {
