@@ -26,7 +26,7 @@ struct PictureSpec {
   bool scale_bar = true;    // and the legend of the colours
 };
 
-inline constexpr std::int64_t kPictureSideMax_px = 8192;
+inline constexpr std::int64_t kPictureSideMax_px = 4096;  // about 15 s of one core for a full frame
 
 /// 8-bit RGB, row-major from the top row.
 struct Picture {

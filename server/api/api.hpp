@@ -72,6 +72,8 @@ struct Endpoint {
   std::string_view schema;                                // component of the JSON answer; of one line for NDJSON
   std::vector<ProblemKind> problems;                      // beyond those that every operation can answer
   http::Response (*handler)(Context&, const Call&);
+  /// Folds a history or draws: seconds for a large colony. Holds at most half of the worker threads.
+  bool is_heavy = false;
 };
 
 std::span<const Endpoint> endpoints();

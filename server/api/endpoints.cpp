@@ -1,5 +1,6 @@
 // The table of operations, and what is checked before any handler runs.
 #include "engine/base/stop.hpp"
+#include "engine/picture/render.hpp"
 #include "server/api/api.hpp"
 #include "server/api/openapi.hpp"
 #include "server/api/schema.hpp"
@@ -142,7 +143,8 @@ std::vector<Endpoint> make_endpoints() {
        {{200, "the cells"}},
        "Cell",
        {kNotFound, kTimeNotReached},
-       get_cells},
+       get_cells,
+       true},
       {"GET",
        "/v1/jobs/{job_id}/series",
        "listSeries",
@@ -152,7 +154,8 @@ std::vector<Endpoint> make_endpoints() {
        {{200, "the rows"}},
        "Series",
        {kNotFound},
-       get_series},
+       get_series,
+       true},
       {"GET",
        "/v1/jobs/{job_id}/image",
        "drawImage",
@@ -161,13 +164,14 @@ std::vector<Endpoint> make_endpoints() {
        {kAtH,
         {"style", QueryType::kName, 0, 0, {"shaded", "contours"}, "default shaded"},
         {"um_per_px", QueryType::kNumber, 0.01, 1000, {}, "scale; not together with width_px"},
-        {"width_px", QueryType::kInteger, 16, 8192, {}, "width; default 1024"},
+        {"width_px", QueryType::kInteger, 16, kPictureSideMax_px, {}, "width; default 1024"},
         {"colour_by", QueryType::kName, 0, 0, {"activity", "generation", "age", "volume"}, "default activity"},
         {"scale_bar", QueryType::kBoolean, 0, 0, {}, "default true"}},
        {{200, "the picture"}},
        "",
        {kNotFound, kTimeNotReached},
-       get_image},
+       get_image,
+       true},
       {"GET",
        "/v1/jobs/{job_id}/log",
        "readLog",
@@ -277,7 +281,8 @@ void Api::add_routes(http::Router& router) {
     router.add(std::string(endpoint.method), pattern,
                [&endpoint, context = context_.get()](const http::Request& request) {
                  return run_endpoint(endpoint, *context, request);
-               });
+               },
+               endpoint.is_heavy ? http::Router::Weight::kHeavy : http::Router::Weight::kLight);
   }
 }
 

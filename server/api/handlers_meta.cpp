@@ -1,4 +1,5 @@
 // Handlers of what the server says about itself.
+#include "engine/picture/render.hpp"
 #include "server/api/api.hpp"
 #include "server/api/codec_model.hpp"
 #include "server/api/schema.hpp"
@@ -59,7 +60,7 @@ http::Response get_service_info(Context& context, const Call&) {
                                {"jobs_per_page_max", kJobsPerPageMax},
                                {"events_per_page_max", kEventsPerPageMax},
                                {"series_points_max", kSeriesPointsMax},
-                               {"picture_side_max_px", 8192},
+                               {"picture_side_max_px", kPictureSideMax_px},
                                {"labels_max", kLabelsMax},
                                {"seed_max", kSeedMax},
                                {"until_time_max_h", kUntilTimeMax_h}}},

@@ -156,7 +156,7 @@ Result<ColonyAt> LocalJobService::colony_at(const std::string& id, std::optional
     seq = *found;
   }
   auto colony = past_.colony_after(*job, seq);
-  if (colony) colony->time_h = *at_h;
+  if (colony && *at_h < job->time_h) colony->time_h = *at_h;  // beyond the end: the final state, at its own time
   return colony;
 }
 

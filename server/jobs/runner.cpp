@@ -63,7 +63,7 @@ class Run {
   JobRow reread();
   EventBatch take_batch();
   std::string replay_hint(std::uint64_t from) const {
-    return "replay with: colony verify " + tail_.id + " --from " + std::to_string(from);
+    return "to replay: the job's spec, its stored events before " + std::to_string(from) + ", then one step";
   }
 
   const RunnerEnvironment& env_;

@@ -78,7 +78,7 @@ std::optional<JobRow> oldest_queued_row(Connection& connection) {
 }
 
 std::vector<JobRow> list_job_rows(Connection& connection, const JobFilter& filter, std::int64_t before,
-                                  std::size_t limit) {
+                                  std::size_t limit, std::size_t spec_bytes_max) {
   std::string sql = COLONY_JOB_COLUMNS " AND job_key < ?";
   if (filter.state) sql += " AND state = ?";
   if (filter.kind) sql += " AND kind = ?";
@@ -95,7 +95,11 @@ std::vector<JobRow> list_job_rows(Connection& connection, const JobFilter& filte
   for (const auto& [name, value] : filter.labels) row.bind(std::string_view(name)).bind(std::string_view(value));
   row.bind(static_cast<std::int64_t>(limit));
   std::vector<JobRow> jobs;
-  while (row.step()) jobs.push_back(row_at(row));
+  std::size_t spec_bytes = 0;
+  while ((jobs.empty() || spec_bytes <= spec_bytes_max) && row.step()) {
+    jobs.push_back(row_at(row));
+    spec_bytes += jobs.back().spec_json.size();
+  }
   for (JobRow& job : jobs) read_labels(connection, job);
   return jobs;
 }

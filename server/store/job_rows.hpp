@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -18,8 +19,10 @@ std::optional<JobRow> find_job_row(Connection& connection, const std::string& id
 /// The oldest queued job.
 std::optional<JobRow> oldest_queued_row(Connection& connection);
 /// Newest first, with job_key < before.
+/// Ends after the first row with which the specs exceed spec_bytes_max together.
 std::vector<JobRow> list_job_rows(Connection& connection, const JobFilter& filter, std::int64_t before,
-                                  std::size_t limit);
+                                  std::size_t limit,
+                                  std::size_t spec_bytes_max = std::numeric_limits<std::size_t>::max());
 std::vector<std::uint64_t> count_job_rows(Connection& connection);
 /// Reads the queued ones only, whatever the number of ended ones.
 std::uint64_t count_queued_rows(Connection& connection);

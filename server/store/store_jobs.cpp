@@ -136,14 +136,19 @@ Result<JobPage> SqliteStore::list_jobs(const JobFilter& filter, std::size_t limi
     before = *key;
   }
   constexpr std::size_t kPageMax = 100'000;
+  constexpr std::size_t kPageSpecBytesMax = 4 << 20;
   if (limit == 0 || limit > kPageMax) {
     return Error{
         ErrorCode::kInvalid, "limit is out of range", {{"limit", "must lie in 1.." + std::to_string(kPageMax)}}};
   }
   return readers_->read([&](Connection& connection) -> Result<JobPage> {
     JobPage page;
-    page.items = list_job_rows(connection, filter, before, limit + 1);  // one more tells whether there is a next page
-    if (page.items.size() > limit) {
+    // One more tells whether there is a next page. A spec can be a megabyte (positions of founders), so a page is bounded in
+    // bytes as well: it may have fewer items than asked for, and then `next`.
+    page.items = list_job_rows(connection, filter, before, limit + 1, kPageSpecBytesMax);
+    std::size_t spec_bytes = 0;
+    for (const JobRow& job : page.items) spec_bytes += job.spec_json.size();
+    if (page.items.size() > limit || (page.items.size() > 1 && spec_bytes > kPageSpecBytesMax)) {
       page.items.pop_back();
       page.next = cursor_text(page.items.back().job_key, cursor_salt_);
     }
