@@ -49,8 +49,8 @@ Status check_founders(const RunSpec& spec, StopFlag stop);
 /// What decides the history, complete: seed, preset, until, model. Name and labels belong to the job, not to its spec.
 Json encode_spec(const JobSpec& spec);
 
-/// A stored spec, for the runner (jobs/ has no JSON). It was held to the limits of its day and is not held to today's; its
-/// founders are not placed.
+/// A stored spec, for the runner (jobs/ has no JSON). It was held to the limits of its day and is not held to today's;
+/// its founders are not placed.
 Result<RunSpec> decode_stored_spec(const std::string& spec_json);
 
 /// What the store keeps of a spec.

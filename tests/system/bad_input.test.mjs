@@ -72,7 +72,7 @@ const bodies = [
   ['founders that overlap', withModel({ founders: { positions_um: [[0, 0], [500, 0], [0.5, 0]] } }), [422], ['/model/founders/positions_um/2']],
   ['a founder outside the dish', withModel({ founders: { positions_um: [[0, 0], [500, 0]] }, dish: { radius_um: 200 } }), [422],
     ['/model/founders/positions_um/1']],
-  ['more founders than have room', withModel({ founders: { count: 5000, radius_um: 30 } }), [422], ['/model/founders']],
+  ['more founders than have room', withModel({ founders: { count: 5000, radius_um: 30 } }, { until: { time_h: 1 } }), [422], ['/model/founders']],
   ['too many founders', withModel({ founders: { count: 100_001 } }), [422], ['/model/founders/count']],
   ['no founder', withModel({ founders: { count: 0 } }), [422], ['/model/founders/count']],
   ['a founder of one coordinate', withModel({ founders: { positions_um: [[0]] } }), [422], ['/model/founders/positions_um/0']],
