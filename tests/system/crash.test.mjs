@@ -17,10 +17,11 @@ function rows(data, table) {
   const query = (sql) => execFileSync('sqlite3', ['-batch', '-noheader', `file:${join(data, 'colony.db')}?mode=ro`, sql],
     { encoding: 'utf8', maxBuffer: 1 << 30 });
   const columns = query(`select name from pragma_table_info('${table}')`).split('\n').filter((name) => name && name !== 'job_key');
-  assert.ok(columns.includes('seq'), `table ${table} has a column seq`);
+  const order = columns.find((name) => name === 'seq' || name === 'time_h');
+  assert.equal(order, table === 'series' ? 'time_h' : 'seq', `table ${table} has its order`);
   // quote() prints doubles to 15 digits only; their bytes are compared through a text that round-trips.
   const exact = columns.map((name) => `case typeof("${name}") when 'real' then printf('%!.17g', "${name}") else quote("${name}") end`);
-  return query(`select ${exact.join(" || '|' || ")} from "${table}" order by ${columns.map((name) => `"${name}"`).join(', ')}`)
+  return query(`select ${exact.join(" || '|' || ")} from "${table}" order by "${order}", ${columns.map((name) => `"${name}"`).join(', ')}`)
     .split('\n').filter(Boolean);
 }
 
@@ -38,17 +39,20 @@ async function killAt(server, id, seq) {
 test('kill -9', async (t) => {
   const quiet = await startServer(t);
   const reference = await finishedJob(quiet, spec);
-  const expected = Object.fromEntries(['event', 'placement', 'woken'].map((table) => [table, rows(quiet.data, table)]));
+  const expected = Object.fromEntries(['event', 'placement', 'woken', 'series'].map((table) => [table, rows(quiet.data, table)]));
   assert.ok(expected.event.length === reference.last_seq && expected.placement.length >= 2 * (spec.until.cells - 1));
+  assert.equal(expected.series.length, Math.floor(reference.progress.time_h) + 1, 'a row for every whole hour');
 
   await t.test(`${killCount} times at random events: the same digest and the same rows`, async () => {
     const seed = Number(process.env.COLONY_TEST_SEED ?? 20261122);
     const random = seeded(seed);
-    const moments = Array.from({ length: killCount }, () => 1 + Math.floor(random() * (reference.last_seq - 1))).sort((a, b) => a - b);
+    // The last fifth is the job's own, so that it cannot end while the last kill is on its way.
+    const moments = Array.from({ length: killCount }, () => 1 + Math.floor(random() * 0.8 * reference.last_seq)).sort((a, b) => a - b);
     t.diagnostic(`seed ${seed}, kills at events ${moments.join(' ')}`);
     const data = temporaryFolder(t);
     let server = await new Server(data, []).ready();
     const { id } = await submit(server, spec);
+    let kills = 0; // of a server whose job was not at its end when the next one was up
     for (const [index, moment] of moments.entries()) {
       const seen = await killAt(server, id, moment);
       server = new Server(data, []);
@@ -62,8 +66,11 @@ test('kill -9', async (t) => {
       const job = await show(server, id);
       assert.ok(job.last_seq >= seen, `event ${seen} was seen by a watcher and is gone: ${job.last_seq}`);
       if (terminal.includes(job.state)) break;
+      ++kills;
     }
+    t.diagnostic(`${kills} kills in the middle of the job`);
     try {
+      assert.equal(kills, killCount, 'the job ended before its last kill');
       const job = await reached(server, id, 'succeeded', 600_000);
       assert.deepEqual([job.digest, job.last_seq], [reference.digest, reference.last_seq]);
       for (const [table, wanted] of Object.entries(expected)) {
