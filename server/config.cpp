@@ -136,6 +136,8 @@ const std::vector<Key>& keys() {
                        [](Config& c) -> Big& { return c.jobs.cells_max; }),
       integer_key<Big>("limits.events_max", 1, 1'000'000'000'000, "events of a job; default 50000000",
                        [](Config& c) -> Big& { return c.jobs.events_max; }),
+      integer_key<Big>("limits.cached_cells_max", 1, 1'000'000'000, "cells of all folded colonies kept; default 2000000",
+                       [](Config& c) -> Big& { return c.jobs.cached_cells_max; }),
       integer_key<Size>("limits.cached_colonies_max", 1, 10'000,
                         "folded colonies kept for pictures and tables; default 16",
                         [](Config& c) -> Size& { return c.jobs.cached_colonies_max; }),

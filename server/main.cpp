@@ -100,8 +100,8 @@ int serve(const Config& config) {
   const int signal = wait_for_signal(signals);
   spdlog::info("ending on signal {}", signal);
   api.drain();
+  jobs->drain();  // first: a request that folds a long history ends with it, and stop() joins the handlers
   (*server)->stop(kGrace_ms);
-  jobs->drain();
   spdlog::info("ended");
   return 0;
 }

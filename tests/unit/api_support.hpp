@@ -231,4 +231,8 @@ inline std::vector<std::string> faults(http::Response& response) {
   return out;
 }
 
+inline std::string header(const http::Response& response, std::string_view name) {
+  return std::string(response.headers.get(name).value_or(""));
+}
+
 }  // namespace colony::server::testing

@@ -7,93 +7,11 @@
 #include <thread>
 #include <vector>
 
+#include "tests/unit/http_sources.hpp"
 #include "tests/unit/http_support.hpp"
 
 namespace colony::server::http {
 namespace {
-
-/// What a test knows of the sources that a server holds.
-class Watch {
- public:
-  void created() { change(created_); }
-  void destroyed() { change(destroyed_); }
-  void waiting() { change(waiting_); }
-  void wait_for_destroyed(int count) { wait(destroyed_, count); }
-  void wait_for_waiting(int count) { wait(waiting_, count); }
-  int destroyed_count() {
-    const std::lock_guard lock(mutex_);
-    return destroyed_;
-  }
-  int created_count() {
-    const std::lock_guard lock(mutex_);
-    return created_;
-  }
-
- private:
-  void change(int& count) {
-    const std::lock_guard lock(mutex_);
-    ++count;
-    changed_.notify_all();
-  }
-  void wait(const int& count, int wanted) {
-    std::unique_lock lock(mutex_);
-    if (!changed_.wait_for(lock, std::chrono::milliseconds(kPatienceMs), [&] { return count >= wanted; })) {
-      throw std::runtime_error("nothing happens");
-    }
-  }
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  int created_ = 0;
-  int destroyed_ = 0;
-  int waiting_ = 0;
-};
-
-/// A source made of a function.
-class Source : public BodySource {
- public:
-  using Pulls = std::function<Pull(std::string&)>;
-  Source(Watch& watch, Pulls pulls, std::string farewell = "", std::string keep_alive = "")
-      : watch_(watch), pulls_(std::move(pulls)), farewell_(std::move(farewell)), keep_alive_(std::move(keep_alive)) {
-    watch_.created();
-  }
-  ~Source() override { watch_.destroyed(); }
-  Pull pull(std::string& out) override {
-    const Pull result = pulls_(out);
-    if (result == Pull::kWait) watch_.waiting();
-    return result;
-  }
-  std::string_view keep_alive() const override { return keep_alive_; }
-  std::string_view farewell() const override { return farewell_; }
-
- private:
-  Watch& watch_;
-  Pulls pulls_;
-  std::string farewell_;
-  std::string keep_alive_;
-};
-
-using Pull = BodySource::Pull;
-
-Source::Pulls pieces(std::vector<std::string> all) {
-  return [all = std::move(all), next = std::size_t{0}](std::string& out) mutable {
-    out += all[next++];
-    return next == all.size() ? Pull::kEnd : Pull::kMore;
-  };
-}
-
-Handler source_route(Watch& watch, std::function<Source::Pulls()> make, std::string farewell = "",
-                     std::string keep_alive = "") {
-  return [&watch, make = std::move(make), farewell, keep_alive](const Request&) {
-    return streamed(std::make_unique<Source>(watch, make(), farewell, keep_alive));
-  };
-}
-
-Source::Pulls waits_for_ever() {
-  return [](std::string& out) {
-    if (out.empty()) out += "data: 1\n\n";
-    return Pull::kWait;
-  };
-}
 
 TEST(HttpStream, PiecesBecomeChunksAndTheConnectionStays) {
   Watch watch;
@@ -335,88 +253,6 @@ TEST(HttpStream, ASourceIsPulledAgainWhenItAskedForIt) {
   const Reply reply = client.ask(get("/s"));
   EXPECT_EQ(reply.body, "third") << "no sign of life in between";
   EXPECT_TRUE(reply.is_complete);
-}
-
-TEST(HttpStream, WatchersHoldNoWorker) {
-  ServerConfig config;
-  config.worker_threads = 1;
-  Watch watch;
-  TestServer server([&watch](Router& router) { router.add("GET", "/s", source_route(watch, waits_for_ever)); }, config);
-  server.run();
-  std::vector<std::unique_ptr<RawClient>> watchers;
-  for (int i = 0; i < 50; ++i) {
-    watchers.push_back(std::make_unique<RawClient>(server.port()));
-    watchers.back()->send(get("/s"));
-    ASSERT_TRUE(watchers.back()->read_until("data: 1"));
-  }
-  watch.wait_for_waiting(50);
-  RawClient client(server.port());
-  EXPECT_EQ(client.ask(get("/hello")).body, "hello");
-}
-
-TEST(HttpStream, StopSaysFarewell) {
-  Watch watch;
-  TestServer server([&watch](Router& router) {
-    router.add("GET", "/waits", source_route(watch, waits_for_ever, "event: bye\n\n"));
-    router.add("GET", "/runs",
-               source_route(
-                   watch,
-                   [] {
-                     return [](std::string& out) {
-                       out += "data: more\n\n";
-                       return Pull::kMore;
-                     };
-                   },
-                   "event: bye\n\n"));
-  });
-  server.run();
-  RawClient waits(server.port());
-  waits.send(get("/waits"));
-  ASSERT_TRUE(waits.read_until("data: 1"));
-  RawClient runs(server.port());
-  runs.send(get("/runs"));
-  ASSERT_TRUE(runs.read_until("data: more"));
-  std::thread stopper([&server] { server.stop(kPatienceMs); });
-  EXPECT_NE(waits.read_to_end().find("event: bye\n\n\r\n0\r\n\r\n"), std::string::npos);
-  const std::string rest = runs.read_to_end();
-  const std::string ending = "c\r\nevent: bye\n\n\r\n0\r\n\r\n";
-  ASSERT_GE(rest.size(), ending.size());
-  EXPECT_EQ(rest.substr(rest.size() - ending.size()), ending);
-  stopper.join();
-  EXPECT_EQ(watch.destroyed_count(), 2);
-}
-
-TEST(HttpStream, StopEndsWithStreamsIdleAndSlowClientsOpen) {
-  Watch watch;
-  TestServer server([&watch](Router& router) {
-    router.add("GET", "/stays", source_route(watch, waits_for_ever));  // no farewell: it would like to stay for ever
-    router.add("GET", "/bye", source_route(watch, waits_for_ever, "event: bye\n\n"));
-    router.add("GET", "/floods", source_route(watch, [] {
-                 return [](std::string& out) {
-                   out.append(64 * 1024, 'x');
-                   return Pull::kMore;
-                 };
-               }));
-  });
-  server.run();
-  std::vector<std::unique_ptr<RawClient>> clients;
-  const auto add = [&](const std::string& bytes, const char* until) {
-    clients.push_back(std::make_unique<RawClient>(server.port(), 4096));
-    clients.back()->send(bytes);
-    if (until) {
-      ASSERT_TRUE(clients.back()->read_until(until));
-    }
-  };
-  for (int i = 0; i < 50; ++i) add(get(i % 2 == 0 ? "/stays" : "/bye"), "data: 1");
-  for (int i = 0; i < 5; ++i) add(get("/floods"), "xxxx");
-  for (int i = 0; i < 5; ++i) add(get("/hello"), "hello");
-  for (int i = 0; i < 5; ++i) add("GET /hel", nullptr);
-  for (int i = 0; i < 5; ++i) add("POST /echo HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9\r\n\r\nabc", nullptr);
-  for (int i = 0; i < 5; ++i) add("", nullptr);
-  server.stop(50);
-  EXPECT_EQ(watch.destroyed_count(), watch.created_count());
-  EXPECT_EQ(watch.created_count(), 55);
-  for (auto& client : clients) client->read_to_end();
 }
 
 }  // namespace

@@ -32,6 +32,7 @@ export const thirdParty = [
   { prefix: 'spng.h', places: ['engine/picture/'] },
   { prefix: 'xxhash.h', places: ['engine/base/'] },
   { prefix: 'Random123/', places: ['engine/random/'] },
+  { prefix: 'xmmintrin.h', places: ['engine/base/'] },  // the floating-point mode
   { prefix: 'hwy/', places: ['engine/space/'] },
   { prefix: 'Eigen/', places: ['engine/'] },
   { prefix: 'curl/', places: ['client/'] },
