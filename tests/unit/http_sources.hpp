@@ -82,7 +82,7 @@ inline Source::Pulls pieces(std::vector<std::string> all) {
   };
 }
 
-Handler source_route(Watch& watch, std::function<Source::Pulls()> make, std::string farewell = "",
+inline Handler source_route(Watch& watch, std::function<Source::Pulls()> make, std::string farewell = "",
                      std::string keep_alive = "") {
   return [&watch, make = std::move(make), farewell, keep_alive](const Request&) {
     return streamed(std::make_unique<Source>(watch, make(), farewell, keep_alive));
