@@ -235,4 +235,18 @@ inline std::string header(const http::Response& response, std::string_view name)
   return std::string(response.headers.get(name).value_or(""));
 }
 
+/// `text` cut at every `end`.
+inline std::vector<std::string> split_lines(const std::string& text, const std::string& end) {
+  std::vector<std::string> lines;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t stop = text.find(end, at);
+    lines.push_back(text.substr(at, stop - at));
+    at = stop == std::string::npos ? text.size() : stop + end.size();
+  }
+  return lines;
+}
+
+/// The path of the fixture's job.
+inline const std::string kJob = std::string("/v1/jobs/") + kJobId;
+
 }  // namespace colony::server::testing

@@ -16,9 +16,6 @@ using api::Json;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-const std::string kJob = std::string("/v1/jobs/") + kJobId;
-const std::string kSpec = R"({"until": {"cells": 10}})";
-
 TEST(Submit, StoresTheCompleteSpecAndAnswers201WithLocation) {
   ApiFixture fixture;
   auto response =

@@ -15,22 +15,6 @@ using api::Json;
 using ::testing::ElementsAre;
 using ::testing::StartsWith;
 
-const std::string kJob = std::string("/v1/jobs/") + kJobId;
-
-std::string header(const http::Response& response, std::string_view name) {
-  return std::string(response.headers.get(name).value_or(""));
-}
-
-std::vector<std::string> split_lines(const std::string& text, const std::string& end) {
-  std::vector<std::string> lines;
-  for (std::size_t at = 0; at < text.size();) {
-    const std::size_t stop = text.find(end, at);
-    lines.push_back(text.substr(at, stop - at));
-    at = stop == std::string::npos ? text.size() : stop + end.size();
-  }
-  return lines;
-}
-
 TEST(Events, PagesNdjsonAndCsvAreTheSameFacts) {
   ApiFixture fixture;
   const std::size_t count = fixture.jobs.history.size();
