@@ -16,6 +16,8 @@ using api::Json;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
+const std::string kSpec = R"({"until": {"cells": 10}})";
+
 TEST(Submit, StoresTheCompleteSpecAndAnswers201WithLocation) {
   ApiFixture fixture;
   auto response =
