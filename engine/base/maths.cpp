@@ -48,13 +48,33 @@ constexpr double kLn2Low = 1.90821492927058770002e-10;
 
 }  // namespace
 
-SinCos sincos(double angle_rad) {
+namespace {
+
+struct Reduced {
+  double r = 0.0;             // within pi/4 of 0
+  std::int64_t quadrant = 0;  // 0..3
+};
+
+Reduced reduce(double angle_rad) {
   CHECK(angle_rad >= -1e5 && angle_rad <= 1e5);
   const double quarter = nearest(angle_rad * (2.0 / kPi));
   const double r = ((angle_rad - quarter * kHalfPiHigh) - quarter * kHalfPiMiddle) - quarter * kHalfPiLow;
-  const double s = sin_series(r);
-  const double c = cos_series(r);
-  switch (static_cast<std::int64_t>(quarter) & 3) {
+  return {r, static_cast<std::int64_t>(quarter) & 3};
+}
+
+}  // namespace
+
+double sine(double angle_rad) {
+  const Reduced reduced = reduce(angle_rad);
+  const double value = (reduced.quadrant & 1) != 0 ? cos_series(reduced.r) : sin_series(reduced.r);
+  return (reduced.quadrant & 2) != 0 ? -value : value;
+}
+
+SinCos sincos(double angle_rad) {
+  const Reduced reduced = reduce(angle_rad);
+  const double s = sin_series(reduced.r);
+  const double c = cos_series(reduced.r);
+  switch (reduced.quadrant) {
     case 0: return {s, c};
     case 1: return {c, -s};
     case 2: return {-s, -c};

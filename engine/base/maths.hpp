@@ -15,6 +15,8 @@ struct SinCos {
 
 /// |angle_rad| <= 1e5.
 SinCos sincos(double angle_rad);
+/// sincos(angle_rad).sin, the same bits, without the other half.
+double sine(double angle_rad);
 /// x > 0.
 double log(double x);
 /// |x| <= 700.

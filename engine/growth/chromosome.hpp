@@ -31,6 +31,7 @@ class Chromosome {
   /// The gene's value in [0, 1]: code / (2^bits - 1), after Gray decoding if asked.
   double value(int gene, Coding coding) const;
   friend bool operator==(const Chromosome&, const Chromosome&) = default;
+  friend auto operator<=>(const Chromosome&, const Chromosome&) = default;
 
  private:
   int bits_;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
 
 #include "engine/base/check.hpp"
 #include "engine/space/overlap.hpp"
@@ -127,8 +128,10 @@ class Search {
 
   void evaluate(Candidate& candidate) {
     throw_if_stopped(stop_);
-    candidate.fitness = scorer_.score(decode(candidate.chromosome, task_.frame, params_), points_);
     ++evaluation_count_;
+    const auto [known, is_new] = scores_.try_emplace(candidate.chromosome, 0.0);
+    if (is_new) known->second = scorer_.score(decode(candidate.chromosome, task_.frame, params_), points_);
+    candidate.fitness = known->second;
   }
 
   // The first candidate of the population with the highest fitness.
@@ -254,6 +257,7 @@ class Search {
   const PointSet points_;
   const std::size_t population_size_;
   Candidate best_;
+  std::map<Chromosome, double> scores_;     // a converging population makes the same candidate again and again
   std::uint32_t evaluation_count_ = 0;
   bool corrected_ = false;
 };

@@ -9,8 +9,6 @@
 namespace colony {
 namespace {
 
-double sine(double x) { return maths::sincos(x).sin; }
-
 bool finite(const Vec3& v) { return std::isfinite(v.x()) && std::isfinite(v.y()) && std::isfinite(v.z()); }
 
 }  // namespace
@@ -64,14 +62,14 @@ Vec3 rotation_vector(const Mat3& r) {
 }
 
 double gardner_noise(double u, double v, double w, const NoiseParams& p) {
-  const double sx = sine(p.frequency * u);
-  const double sy = sine(p.frequency * v);
-  const double sz = sine(p.frequency * w);
+  const double sx = maths::sine(p.frequency * u);
+  const double sy = maths::sine(p.frequency * v);
+  const double sz = maths::sine(p.frequency * w);
   const double second = p.amplitude / 1.17;
   const double slower = p.frequency / 1.35;
-  const double gx = p.amplitude * sx + second * sine(slower * u + p.phase * sz);
-  const double gy = p.amplitude * sy + second * sine(slower * v + p.phase * sx);
-  const double gz = p.amplitude * sz + second * sine(slower * w + p.phase * sy);
+  const double gx = p.amplitude * sx + second * maths::sine(slower * u + p.phase * sz);
+  const double gy = p.amplitude * sy + second * maths::sine(slower * v + p.phase * sx);
+  const double gz = p.amplitude * sz + second * maths::sine(slower * w + p.phase * sy);
   return gx * gy * gz;
 }
 

@@ -2,7 +2,9 @@
 // the last place.
 #include "engine/base/maths.hpp"
 
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 
 #include <gtest/gtest.h>
@@ -134,6 +136,13 @@ TEST(Check, FailureNamesConditionPlaceAndContextsFromOuterToInner) {
     const std::string text = failure.what();
     EXPECT_NE(text.find("1 + 1 == 3"), std::string::npos) << text;
     EXPECT_NE(text.find("; job 7; seq 12"), std::string::npos) << text;
+  }
+}
+
+TEST(Maths, SineIsTheSineOfSincosToTheLastBit) {
+  for (int i = -20'000; i <= 20'000; ++i) {
+    const double x = 0.0137 * i;
+    ASSERT_EQ(std::bit_cast<std::uint64_t>(maths::sine(x)), std::bit_cast<std::uint64_t>(maths::sincos(x).sin)) << x;
   }
 }
 
