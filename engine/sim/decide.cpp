@@ -97,9 +97,10 @@ Inhibited inhibited(const Colony& colony, const Params& params, Seed seed, const
 
 }  // namespace
 
-EventBody decide_division(const Colony& colony, const Params& params, Seed seed, CellId id, double time_h, StopFlag stop) {
+Decision decide_division(const Colony& colony, const Params& params, Seed seed, CellId id, double time_h, Workspace&,
+                         StopFlag stop) {
   const Cell& parent = colony.cell(id);
-  if (params.division.generation_limit && parent.generation >= *params.division.generation_limit) return Senesced{};
+  if (params.division.generation_limit && parent.generation >= *params.division.generation_limit) return {Senesced{}, {}};
 
   SearchTask task;
   task.seed = seed;
@@ -113,7 +114,7 @@ EventBody decide_division(const Colony& colony, const Params& params, Seed seed,
   const SearchResult found = find_space(colony, params, task, stop);
   // The dish's wall is hard also where inhibition is off.
   if (found.crosses_wall || (params.division.inhibition && !(found.fitness >= params.contact.fitness_min))) {
-    return inhibited(colony, params, seed, parent, time_h, found);
+    return {inhibited(colony, params, seed, parent, time_h, found), {}};
   }
 
   Divided event;
@@ -124,7 +125,6 @@ EventBody decide_division(const Colony& colony, const Params& params, Seed seed,
   event.cells[0].id = parent.id;
   event.cells[0].parent_id = parent.parent_id;
   event.cells[0].ordinal = parent.ordinal + 1;
-  event.cells[1].id = CellId{static_cast<std::uint32_t>(colony.cells().size() + 1)};
   event.cells[1].parent_id = parent.id;
   event.plane_point_um = parent.nucleus_um;
   event.plane_normal = task.frame.direction;
@@ -134,10 +134,10 @@ EventBody decide_division(const Colony& colony, const Params& params, Seed seed,
   event.corrected = found.corrected;
   const std::array<Body, 2> bodies = {Body(found.pair.bodies[0], params.noise), Body(found.pair.bodies[1], params.noise)};
   event.woken = wake_sleepers(colony, params, seed, time_h, {id, bodies});
-  return event;
+  return {event, {}};
 }
 
-EventBody decide_settling(const Colony& colony, const Params& params, Seed seed, CellId id) {
+Decision decide_settling(const Colony& colony, const Params& params, Seed seed, CellId id, Workspace&) {
   const Cell& cell = colony.cell(id);
   const Body& body = colony.body(id);
   const std::vector<const Body*> neighbours = neighbours_of(colony, id);
@@ -153,7 +153,7 @@ EventBody decide_settling(const Colony& colony, const Params& params, Seed seed,
   event.nearest_membrane_um = nearest_membrane_um(body, neighbours, rule, event.nucleus_um,
                                                   points_for(seed, cell, Purpose::kSettlePoints, 1, kMembranePoints))
                                   .value_or(event.nucleus_um);
-  return event;
+  return {event, {}};
 }
 
 }  // namespace colony

@@ -7,6 +7,7 @@
 #pragma once
 
 #include "engine/base/stop.hpp"
+#include "engine/growth/workspace.hpp"
 #include "engine/model/colony.hpp"
 #include "engine/model/event.hpp"
 #include "engine/model/params.hpp"
@@ -14,12 +15,18 @@
 
 namespace colony {
 
-/// The body of the event for a division attempt of `id` at `time_h`: Divided, Inhibited or Senesced.
-/// Throws Stopped when asked to.
-EventBody decide_division(const Colony& colony, const Params& params, Seed seed, CellId id, double time_h,
-                          StopFlag stop = nullptr);
+/// What happens, and what it took to find out (shown by benchmarks; no part of any event).
+struct Decision {
+  EventBody body;
+  Work work;
+};
+
+/// A division attempt of `id` at `time_h`: Divided, Inhibited or Senesced. The daughter's id is left 0: it is given when the
+/// event is committed, in serial order. Throws Stopped when asked to.
+Decision decide_division(const Colony& colony, const Params& params, Seed seed, CellId id, double time_h, Workspace& workspace,
+                         StopFlag stop = nullptr);
 
 /// The nucleus of `id` comes to rest: Settled.
-EventBody decide_settling(const Colony& colony, const Params& params, Seed seed, CellId id);
+Decision decide_settling(const Colony& colony, const Params& params, Seed seed, CellId id, Workspace& workspace);
 
 }  // namespace colony

@@ -16,11 +16,13 @@ RunSpec checked(RunSpec spec) {
 
 }  // namespace
 
-Simulator::Simulator(RunSpec spec, StopFlag stop)
+Simulator::Simulator(RunSpec spec, StopFlag stop, int threads)
     : spec_(checked(std::move(spec))),
       stop_(stop),
       founder_count_(colony::founder_count(spec_.params.founders)),
-      colony_(spec_.params) {
+      colony_(spec_.params),
+      workspace_(spec_.params) {
+  CHECK(threads >= 1);
   check_floating_point_mode();
 }
 
@@ -33,6 +35,9 @@ void Simulator::replay(const Event& stored) {
 
 Event Simulator::commit(Event event) {
   event.seq = colony_.last_seq() + 1;
+  if (auto* divided = std::get_if<Divided>(&event.body)) {
+    divided->cells[1].id = CellId{static_cast<std::uint32_t>(colony_.cells().size() + 1)};
+  }
   canonicalise(event);
   event.digest = digest_after(colony_.digest(), event);
   colony_.apply(event);
@@ -86,13 +91,18 @@ std::optional<Event> Simulator::step() {
   Event event;
   event.time_h = item.due_h;
   event.cell_id = item.cell_id;
+  Decision decision;
   switch (item.kind) {
-    case DueKind::kSettle: event.body = decide_settling(colony_, spec_.params, spec_.seed, item.cell_id); break;
+    case DueKind::kSettle:
+      decision = decide_settling(colony_, spec_.params, spec_.seed, item.cell_id, workspace_);
+      break;
     case DueKind::kDivide:
-      event.body = decide_division(colony_, spec_.params, spec_.seed, item.cell_id, item.due_h, stop_);
+      decision = decide_division(colony_, spec_.params, spec_.seed, item.cell_id, item.due_h, workspace_, stop_);
       break;
     case DueKind::kMove: CHECK(false && "moves are refused by validate()"); break;
   }
+  work_ += decision.work;
+  event.body = std::move(decision.body);
   ++next_;  // only now: a stopped decision is made again
   return commit(std::move(event));
 }

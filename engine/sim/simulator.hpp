@@ -12,6 +12,7 @@
 
 #include "engine/base/result.hpp"
 #include "engine/base/stop.hpp"
+#include "engine/growth/workspace.hpp"
 #include "engine/model/colony.hpp"
 #include "engine/model/event.hpp"
 #include "engine/model/params.hpp"
@@ -47,7 +48,8 @@ class Simulator {
  public:
   /// The spec must be valid (validate() empty, CHECKed). Founders are placed when the first of them is needed, so that replaying
   /// a stored history costs no placement. While `stop` is set, step() throws Stopped and changes nothing.
-  explicit Simulator(RunSpec spec, StopFlag stop = nullptr);
+  /// `threads` >= 1: how many may decide at once; it cannot change the history.
+  explicit Simulator(RunSpec spec, StopFlag stop = nullptr, int threads = 1);
 
   /// Folds one stored event; nothing is decided. Events must come in order, from seq 1.
   void replay(const Event& stored);
@@ -61,6 +63,8 @@ class Simulator {
   const Colony& colony() const { return colony_; }
   const Agenda& agenda() const { return agenda_; }
   const RunSpec& spec() const { return spec_; }
+  /// What all decisions so far took.
+  const Work& work() const { return work_; }
 
  private:
   std::optional<FinishReason> reason_to_finish() const;
@@ -72,6 +76,8 @@ class Simulator {
   std::vector<Cell> founders_;               // placed at the first founding; empty before
   Colony colony_;
   Agenda agenda_;
+  Workspace workspace_;
+  Work work_;
   std::vector<AgendaItem> window_;           // due inside the current window, in serial order; next_ is the first unhandled
   std::size_t next_ = 0;
 };
