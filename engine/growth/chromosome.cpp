@@ -47,10 +47,35 @@ double Chromosome::value(int gene, Coding coding) const {
   return static_cast<double>(number) / static_cast<double>((1U << bits_) - 1U);
 }
 
-Chromosome random_chromosome(int bits, Stream& stream) {
-  Chromosome chromosome(bits);
-  for (int gene = 0; gene < kGeneCount; ++gene) chromosome.set_code(gene, stream.next_u32() >> (32 - bits));
+Chromosome random_chromosome(int gene_count, int bits, Stream& stream) {
+  Chromosome chromosome(gene_count, bits);
+  for (int gene = 0; gene < gene_count; ++gene) chromosome.set_code(gene, stream.next_u32() >> (32 - bits));
   return chromosome;
+}
+
+BitFlips::BitFlips(int length, double rate) : length_(length) {
+  CHECK(length >= 1 && rate >= 0.0 && rate <= 1.0);
+  double survival = 1.0;
+  for (int k = 0; k < length; ++k) {
+    survival *= 1.0 - rate;
+    survival_.push_back(static_cast<std::uint32_t>(survival * 4294967295.0));
+  }
+}
+
+int BitFlips::gap(Stream& stream) const {
+  const std::uint32_t u = stream.next_u32();
+  // The number of k with u < survival_[k], which fall with k.
+  std::size_t low = 0;
+  std::size_t high = survival_.size();
+  while (low < high) {
+    const std::size_t middle = (low + high) / 2;
+    if (u < survival_[middle]) {
+      low = middle + 1;
+    } else {
+      high = middle;
+    }
+  }
+  return static_cast<int>(low);
 }
 
 std::uint32_t code_of(double value, int bits, Coding coding) {
@@ -72,6 +97,12 @@ Chromosome crossover(const Chromosome& a, const Chromosome& b, int cut) {
   return child;
 }
 
+Vec3 across(const Vec3& n) {
+  const double length = std::sqrt(n.x() * n.x() + n.y() * n.y());
+  if (!(length > 1e-9)) return Vec3::UnitX();  // straight up: any will do
+  return {-n.y() / length, n.x() / length, 0.0};
+}
+
 Vec3 semiaxes_um(double volume_um3, double elongation, double flatness) {
   const double mean = maths::cbrt(3.0 * volume_um3 / (4.0 * maths::kPi * flatness));  // sqrt(AB)
   const double root = std::sqrt(elongation);
@@ -91,8 +122,8 @@ Pair decode(const Chromosome& chromosome, const PairFrame& frame, const Params& 
   const double turn = symmetric(params.search.turn_max_deg * kRadiansPerDegree, gene(kTurn));
   const auto [s, c] = maths::sincos(turn);
   const Vec3& n = frame.direction;
-  pair.direction = Vec3(c * n.x() - s * n.y(), s * n.x() + c * n.y(), 0.0);
-  const Vec3 sideways(-pair.direction.y(), pair.direction.x(), 0.0);
+  pair.direction = Vec3(c * n.x() - s * n.y(), s * n.x() + c * n.y(), n.z());
+  const Vec3 sideways = across(pair.direction);
   const double volume = on(params.cell.pair_volume_um3, gene(kPairVolume));
   const double smaller = on(params.cell.smaller_share, gene(kSmallerShare));
 
@@ -111,7 +142,9 @@ Pair decode(const Chromosome& chromosome, const PairFrame& frame, const Params& 
     const double mean = std::sqrt(body.semiaxes_um.x() * body.semiaxes_um.y());
     const Vec3 offset = side * on(params.search.distance, gene(first + kDistance)) * half_width * pair.direction +
                         symmetric(params.search.sideways * mean, gene(first + kSideways)) * sideways;
-    body.centre_um = Vec3(frame.pivot_um.x() + offset.x(), frame.pivot_um.y() + offset.y(), spread_height_um(body.semiaxes_um));
+    const double height = params.layers == Layers::kMono ? 0.0 : gene(kFirstHeight + k);
+    body.centre_um = Vec3(frame.pivot_um.x() + offset.x(), frame.pivot_um.y() + offset.y(),
+                          height_above_dish(body.semiaxes_um.z(), params.layers, height));
   }
   return pair;
 }

@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <array>
-#include <map>
+#include <cmath>
+#include <utility>
 
 #include "engine/base/check.hpp"
 #include "engine/space/overlap.hpp"
@@ -11,68 +12,131 @@ namespace colony {
 namespace {
 
 constexpr std::uint32_t kCorrectorLane = 1000;  // past the last generation of a predictor
-constexpr int kLowBits = 3;                     // of a gene, which the corrector flips
+constexpr double kDropDeviations = 2.0;         // see race_to()
 
-PointSet points_for(const SearchTask& task, Purpose purpose, std::int64_t n, std::uint32_t lane = 0) {
+std::array<std::uint32_t, 3> seeds_for(const SearchTask& task, Purpose purpose, std::uint32_t lane) {
   Stream stream(task.seed, task.cell_id, task.ordinal, purpose, lane);
-  return scrambled_sobol(static_cast<std::uint32_t>(n), stream);
+  return {stream.next_u32(), stream.next_u32(), stream.next_u32()};
+}
+
+double share_left(std::uint32_t hits, std::uint32_t shared) {
+  return shared >= hits ? 0.0 : static_cast<double>(hits - shared) / static_cast<double>(hits);
 }
 
 /// Scores candidate pairs of one search.
 class Scorer {
  public:
-  Scorer(const Colony& colony, const Params& params, const SearchTask& task) : colony_(colony), params_(params), task_(task) {
+  Scorer(const Colony& colony, const Params& params, const SearchTask& task, Workspace& workspace)
+      : colony_(colony), params_(params), task_(task), ws_(workspace) {
     const double reach = search_reach_um(params);
     const Vec3& c = task.frame.pivot_um;
-    // Everything a candidate can touch: all z, because bodies stand on the dish.
-    const Box area = {Vec3(c.x() - reach, c.y() - reach, 0.0), Vec3(c.x() + reach, c.y() + reach, 2.0 * reach)};
-    colony.cells_meeting(area, ids_);
-    std::erase(ids_, task.cell_id);
-    for (const CellId id : ids_) bodies_.push_back(&colony.body(id));
+    // Everything a candidate can touch: all z, because bodies stand on the dish or little above it.
+    const Box area = {Vec3(c.x() - reach, c.y() - reach, 0.0), Vec3(c.x() + reach, c.y() + reach, c.z() + 4.0 * reach)};
+    colony.cells_meeting(area, ws_.ids);
+    std::erase(ws_.ids, task.cell_id);
+    ws_.bodies.clear();
+    ws_.by_distance.clear();
+    for (const CellId id : ws_.ids) {
+      const Body& body = colony.body(id);
+      ws_.bodies.push_back(&body);
+      ws_.by_distance.emplace_back((body.centre_um() - c).squaredNorm(), &body);
+    }
+    // The nearest first: they are the likeliest to be overlapped, so a hopeless candidate is given up early. A stable sort of
+    // ascending ids: one order only.
+    std::stable_sort(ws_.by_distance.begin(), ws_.by_distance.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+    kernel::SearchScene& scene = ws_.scene;
+    scene.neighbours.clear();
+    for (const auto& [distance, body] : ws_.by_distance) scene.neighbours.add(*body, c);
+    scene.dish_z = static_cast<float>(-c.z());
+    scene.has_wall = false;
+    if (params.dish.radius_um) {
+      const double radius = *params.dish.radius_um;
+      scene.has_wall = std::sqrt(c.x() * c.x() + c.y() * c.y()) + std::sqrt(2.0) * reach > radius;
+      scene.wall_x = static_cast<float>(-c.x());
+      scene.wall_y = static_cast<float>(-c.y());
+      scene.wall_radius2 = static_cast<float>(radius * radius);
+    }
+    // In the order of the sequence: every prefix is a fair sample.
+    scrambled_sobol(static_cast<std::uint32_t>(params.search.points), seeds_for(task, Purpose::kSearchPoints, 0), ws_.points);
+    for (std::size_t k = 0; k < 2; ++k) {
+      // Only the noise of this body counts: its place and shape are the candidate's.
+      const Body noise_of({Vec3::Zero(), Vec3::Ones(), Vec3::Zero(), task.frame.noise_offsets[k]}, params.noise);
+      ws_.candidate[k].field = kernel::FloatBody(noise_of, Vec3::Zero());
+      kernel::select_own_points(ws_.candidate[k].field, static_cast<float>(noise_of.noisy_scale()), ws_.points, scene.own[k]);
+    }
     if (params.contact.neighbour_retained_min > 0.0) {
-      retained_points_ = points_for(task, Purpose::kRetained, params.search.points, 0);
+      tiled_sobol(static_cast<std::uint32_t>(params.search.points), seeds_for(task, Purpose::kRetained, 0), ws_.retained_points);
     }
+    ws_.pair.field_count = 0;
+    ws_.pair.noise_count = 0;
   }
 
-  /// From here on neighbours are judged on fresh points too, as the winner is.
-  void refresh() {
-    if (params_.contact.neighbour_retained_min > 0.0) {
-      retained_points_ = points_for(task_, Purpose::kRetained, params_.search.points_final, 1);
+  /// From here on a candidate is given up once it cannot beat `best` any more: after h hits, when more are shared than
+  ///     h (1 - best) + kDropDeviations sqrt(h best (1 - best)) + 1/2.
+  /// A candidate whose true fitness is `best` shares a binomial number with mean h (1 - best) (Sobol points vary less), so it is given
+  /// up with probability below 2.3 % at each of the two looks; one that would be better by d is safer by d sqrt(h / best (1 - best)).
+  void race_to(double best) {
+    const std::size_t n = std::max(ws_.scene.own[0].size(), ws_.scene.own[1].size());
+    ws_.most_shared.resize(n + 1);
+    for (std::size_t h = 0; h <= n; ++h) {
+      const auto hits = static_cast<double>(h);
+      ws_.most_shared[h] =
+          static_cast<std::uint32_t>(hits * (1.0 - best) + kDropDeviations * std::sqrt(hits * best * (1.0 - best)) + 0.5);
     }
+    racing_ = best > 0.0;
   }
 
-  /// Whether the pair scored last reaches beyond the dish's wall.
-  bool crosses_wall() const { return crosses_wall_; }
+  /// On the points of the search. Below the best if it was given up.
+  double score(const Chromosome& chromosome) {
+    ws_.genes.decode(chromosome, task_.frame, ws_.candidate);
+    const kernel::ShareLimit limit = racing_ ? kernel::ShareLimit(ws_.most_shared) : kernel::ShareLimit();
+    const kernel::PairScore score = kernel::score_pair(ws_.scene, ws_.candidate, limit, ws_.pair);
+    if (score.beyond_wall) return 0.0;
+    double fitness = 1.0;
+    for (std::size_t k = 0; k < 2; ++k) {
+      if (score.hits[k] == 0 && score.dropped) continue;  // not looked at
+      fitness = std::min(fitness, share_left(score.hits[k], score.shared[k]));
+    }
+    if (score.dropped || !(fitness > 0.0) || !(params_.contact.neighbour_retained_min > 0.0)) return fitness;
+    const Pair pair = decode(chromosome, task_.frame, params_);
+    const std::array<Body, 2> bodies = {Body(pair.bodies[0], params_.noise), Body(pair.bodies[1], params_.noise)};
+    return neighbours_keep_enough(bodies) ? fitness : 0.0;
+  }
 
-  double score(const Pair& pair, const PointSet& points) {
+  /// On the fresh points, by the definition.
+  double score_finally(const Pair& pair, bool& crosses_wall) {
+    tiled_sobol(static_cast<std::uint32_t>(params_.search.points_final), seeds_for(task_, Purpose::kFinalPoints, 0), ws_.final_points);
     const std::array<Body, 2> bodies = {Body(pair.bodies[0], params_.noise), Body(pair.bodies[1], params_.noise)};
     double fitness = 1.0;
-    crosses_wall_ = false;
+    crosses_wall = false;
     for (std::size_t k = 0; k < 2; ++k) {
-      neighbours_.clear();
-      for (const Body* other : bodies_) {
-        if (meets(other->box(), bodies[k].box())) neighbours_.push_back(other);
+      ws_.near.clear();
+      ws_.near.push_back(&bodies[1 - k]);
+      for (const auto& [distance, other] : ws_.by_distance) {
+        if (meets(other->box(), bodies[k].box())) ws_.near.push_back(other);
       }
-      neighbours_.push_back(&bodies[1 - k]);
-      count_overlaps(bodies[k], neighbours_, params_.dish.radius_um, points, scratch_, counts_);
-      fitness = std::min(fitness, counts_.fitness());
-      crosses_wall_ = crosses_wall_ || counts_.outside_wall_count > 0;
+      count_overlaps(bodies[k], ws_.near, params_.dish.radius_um, ws_.final_points, ws_.overlap, ws_.counts);
+      fitness = std::min(fitness, ws_.counts.fitness());
+      crosses_wall = crosses_wall || ws_.counts.outside_wall_count > 0;
     }
-    if (fitness > 0.0 && params_.contact.neighbour_retained_min > 0.0 && !neighbours_keep_enough(bodies)) return 0.0;
+    if (fitness > 0.0 && params_.contact.neighbour_retained_min > 0.0) {
+      // Neighbours are judged on fresh points too.
+      tiled_sobol(static_cast<std::uint32_t>(params_.search.points_final), seeds_for(task_, Purpose::kRetained, 1), ws_.retained_points);
+      if (!neighbours_keep_enough(bodies)) return 0.0;
+    }
     return fitness;
   }
 
  private:
   bool neighbours_keep_enough(const std::array<Body, 2>& bodies) {
     const std::array<const Body*, 2> added = {&bodies[0], &bodies[1]};
-    for (std::size_t j = 0; j < ids_.size(); ++j) {
-      const Box& box = bodies_[j]->box();
+    for (std::size_t j = 0; j < ws_.ids.size(); ++j) {
+      const Box& box = ws_.bodies[j]->box();
       if (!meets(box, bodies[0].box()) && !meets(box, bodies[1].box())) continue;
-      const double share =
-          retained_share(colony_, params_.contact.rule, ids_[j], task_.cell_id, added, retained_points_);
+      const double share = retained_share(colony_, params_.contact.rule, ws_.ids[j], task_.cell_id, added, ws_.retained_points);
       if (share >= params_.contact.neighbour_retained_min) continue;
       // A neighbour pressed below the minimum before refuses only pairs that press it further.
-      const double before = retained_share(colony_, params_.contact.rule, ids_[j], std::nullopt, {}, retained_points_);
+      const double before = retained_share(colony_, params_.contact.rule, ws_.ids[j], std::nullopt, {}, ws_.retained_points);
       if (share < before) return false;
     }
     return true;
@@ -81,27 +145,15 @@ class Scorer {
   const Colony& colony_;
   const Params& params_;
   const SearchTask& task_;
-  std::vector<CellId> ids_;                 // ascending
-  std::vector<const Body*> bodies_;         // of ids_
-  std::vector<const Body*> neighbours_;     // of the body being scored
-  PointSet retained_points_;
-  OverlapScratch scratch_;
-  OverlapCounts counts_;
-  bool crosses_wall_ = false;
-};
-
-struct Candidate {
-  Chromosome chromosome;
-  double fitness = 0.0;
+  Workspace& ws_;
+  bool racing_ = false;
 };
 
 class Search {
  public:
-  Search(const Colony& colony, const Params& params, const SearchTask& task, StopFlag stop)
-      : params_(params), task_(task), stop_(stop), scorer_(colony, params, task),
-        points_(points_for(task, Purpose::kSearchPoints, params.search.points)),
-        population_size_(static_cast<std::size_t>(params.search.population)),
-        best_{Chromosome(static_cast<int>(params.search.bits))} {}
+  Search(const Colony& colony, const Params& params, const SearchTask& task, Workspace& workspace, StopFlag stop)
+      : params_(params), task_(task), stop_(stop), ws_(workspace), scorer_(colony, params, task, workspace),
+        population_size_(static_cast<std::size_t>(params.search.population)), gene_count_(gene_count_of(params.layers)) {}
 
   SearchResult run() {
     if (params_.search.optimiser == Optimiser::kGenetic) {
@@ -113,11 +165,10 @@ class Search {
     SearchResult result;
     result.pair = decode(best_.chromosome, task_.frame, params_);
     result.search_fitness = best_.fitness;
-    scorer_.refresh();
-    result.fitness = scorer_.score(result.pair, points_for(task_, Purpose::kFinalPoints, params_.search.points_final));
-    result.crosses_wall = scorer_.crosses_wall();
+    result.fitness = scorer_.score_finally(result.pair, result.crosses_wall);
     result.evaluation_count = evaluation_count_;
     result.corrected = corrected_;
+    result.work = {1, evaluation_count_, ws_.pair.field_count, ws_.pair.noise_count};
     return result;
   }
 
@@ -126,53 +177,55 @@ class Search {
   int bits() const { return static_cast<int>(params_.search.bits); }
   bool good() const { return best_.fitness >= params_.contact.fitness_good; }
 
-  void evaluate(Candidate& candidate) {
+  // Scores candidates from `first` on, then takes the best of all; from then on nobody is scored further than it takes to see that
+  // he cannot beat it. The best used for that is never one of the generation in flight, so the order of scoring cannot matter.
+  void evaluate(std::vector<Candidate>& candidates, std::size_t first) {
     throw_if_stopped(stop_);
-    ++evaluation_count_;
-    const auto [known, is_new] = scores_.try_emplace(candidate.chromosome, 0.0);
-    if (is_new) known->second = scorer_.score(decode(candidate.chromosome, task_.frame, params_), points_);
-    candidate.fitness = known->second;
-  }
-
-  // The first candidate of the population with the highest fitness.
-  const Candidate& best_of(const std::vector<Candidate>& population) const {
-    std::size_t best = 0;
-    for (std::size_t i = 1; i < population.size(); ++i) {
-      if (population[i].fitness > population[best].fitness) best = i;
+    for (std::size_t i = first; i < candidates.size(); ++i) {
+      ++evaluation_count_;
+      if (candidates[i].fitness < 0.0) candidates[i].fitness = scorer_.score(candidates[i].chromosome);
     }
-    return population[best];
+    // The first with the highest fitness.
+    std::size_t best = 0;
+    for (std::size_t i = 1; i < candidates.size(); ++i) {
+      if (candidates[i].fitness > candidates[best].fitness) best = i;
+    }
+    best_ = candidates[best];
+    scorer_.race_to(best_.fitness);
   }
 
   void predict() {
-    std::vector<Candidate> population;
+    std::vector<Candidate>& population = ws_.population;
+    std::vector<Candidate>& next = ws_.bred;
+    population.clear();
     Stream first = stream(0);
-    for (std::size_t i = 0; i < population_size_; ++i) population.push_back({random_chromosome(bits(), first), 0.0});
+    for (std::size_t i = 0; i < population_size_; ++i) population.push_back({random_chromosome(gene_count_, bits(), first), kUnscored});
     population[0].chromosome.set_code(kTurn, code_of(0.5, bits(), params_.search.coding));  // the unturned plane
-    for (Candidate& candidate : population) evaluate(candidate);
-    best_ = best_of(population);
-
+    evaluate(population, 0);
     for (std::int64_t generation = 1; generation <= params_.search.generations && !good(); ++generation) {
       Stream random = stream(static_cast<std::uint32_t>(generation));
-      std::vector<Candidate> next = {best_};  // the best is kept, and not scored again
-      while (next.size() < population_size_) next.push_back({breed(population, random), 0.0});
-      for (std::size_t i = 1; i < next.size(); ++i) evaluate(next[i]);
-      population = std::move(next);
-      best_ = best_of(population);
+      next.clear();
+      next.push_back(best_);  // the best is kept, and not scored again
+      while (next.size() < population_size_) next.push_back(breed(population, random));
+      evaluate(next, 1);
+      std::swap(population, next);
     }
   }
 
-  Chromosome breed(const std::vector<Candidate>& population, Stream& random) const {
+  Candidate breed(const std::vector<Candidate>& population, Stream& random) const {
     const Candidate& a = select(population, random);
     const Candidate& b = select(population, random);
-    Chromosome child = a.chromosome;
+    Candidate child = a;
     if (random.uniform() < params_.search.crossover_rate) {
-      const int cut = 1 + static_cast<int>(random.below(static_cast<std::uint32_t>(child.length() - 1)));
-      child = crossover(a.chromosome, b.chromosome, cut);
+      const int cut = 1 + static_cast<int>(random.below(static_cast<std::uint32_t>(child.chromosome.length() - 1)));
+      child.chromosome = crossover(a.chromosome, b.chromosome, cut);
     }
-    const double rate = params_.search.mutation_rate.value_or(1.0 / child.length());
-    const auto threshold = static_cast<std::uint64_t>(rate * 4294967296.0);
-    for (int bit = 0; bit < child.length(); ++bit) {
-      if (random.next_u32() < threshold) child.flip(bit);
+    ws_.mutation.draw(random, [&](int bit) { child.chromosome.flip(bit); });
+    // A child that is its parent again needs no new score: a converging population makes many.
+    if (child.chromosome == b.chromosome) {
+      child.fitness = b.fitness;
+    } else if (child.chromosome != a.chromosome) {
+      child.fitness = kUnscored;
     }
     return child;
   }
@@ -199,73 +252,82 @@ class Search {
 
   void correct() {
     corrected_ = true;
-    const int low_bits = std::min(kLowBits, bits());
-    const int low_bit_count = kGeneCount * low_bits;
+    const int low_bits = std::min(kCorrectorLowBits, bits());
+    const auto low_bit_count = static_cast<std::uint32_t>(gene_count_ * low_bits);
+    std::vector<Candidate>& variants = ws_.bred;
     for (std::int64_t generation = 0; generation < params_.search.corrector_generations && !good(); ++generation) {
       Stream random = stream(kCorrectorLane + static_cast<std::uint32_t>(generation));
-      std::vector<Candidate> variants = {best_};
+      variants.clear();
+      variants.push_back(best_);
       while (variants.size() < population_size_) {
-        Chromosome variant = best_.chromosome;
+        Candidate variant{best_.chromosome, kUnscored};
         // Two low bits on average and one at least: with none it would be the best again.
-        const int certain = static_cast<int>(random.below(static_cast<std::uint32_t>(low_bit_count)));
-        for (int k = 0; k < low_bit_count; ++k) {
-          if (random.below(static_cast<std::uint32_t>(low_bit_count)) != 0 && k != certain) continue;
-          variant.flip((k / low_bits) * bits() + bits() - 1 - k % low_bits);
-        }
-        variants.push_back({variant, 0.0});
+        const auto flip = [&](int k) { variant.chromosome.flip((k / low_bits) * bits() + bits() - 1 - k % low_bits); };
+        const auto certain = static_cast<int>(random.below(low_bit_count));
+        flip(certain);
+        ws_.correction.draw(random, [&](int k) {
+          if (k != certain) flip(k);
+        });
+        variants.push_back(variant);
       }
-      for (std::size_t i = 1; i < variants.size(); ++i) evaluate(variants[i]);
-      best_ = best_of(variants);
+      evaluate(variants, 1);
     }
   }
 
   // Random or Sobol search with as many evaluations as predictor and corrector may use together.
   void sample() {
     const std::int64_t generations = params_.search.generations + params_.search.corrector_generations;
-    std::array<std::uint32_t, kGeneCount> seeds{};
+    std::array<std::uint32_t, kGeneCountMulti> seeds{};
     Stream first = stream(0);
     for (std::uint32_t& seed : seeds) seed = first.next_u32();
     std::uint32_t index = 0;
+    std::vector<Candidate>& batch = ws_.bred;
     for (std::int64_t generation = 0; generation <= generations && !good(); ++generation) {
       Stream random = stream(static_cast<std::uint32_t>(generation) + 1);
-      std::vector<Candidate> batch;
+      batch.clear();
       if (generation > 0) batch.push_back(best_);
       const std::size_t scored_from = batch.size();
       while (batch.size() < population_size_) {
-        Chromosome chromosome(bits());
+        Chromosome chromosome(gene_count_, bits());
         if (params_.search.optimiser == Optimiser::kRandom) {
-          chromosome = random_chromosome(bits(), random);
+          chromosome = random_chromosome(gene_count_, bits(), random);
         } else {
-          for (int gene = 0; gene < kGeneCount; ++gene) {
+          for (int gene = 0; gene < gene_count_; ++gene) {
             const std::uint32_t fraction = owen_scramble(sobol_u32(index, gene), seeds[static_cast<std::size_t>(gene)]);
             const std::uint32_t number = fraction >> (32 - bits());
             chromosome.set_code(gene, params_.search.coding == Coding::kGray ? gray_from_binary(number) : number);
           }
           ++index;
         }
-        batch.push_back({chromosome, 0.0});
+        batch.push_back({chromosome, kUnscored});
       }
-      for (std::size_t i = scored_from; i < batch.size(); ++i) evaluate(batch[i]);
-      best_ = best_of(batch);
+      evaluate(batch, scored_from);
     }
   }
+
+  static constexpr double kUnscored = -1.0;
 
   const Params& params_;
   const SearchTask& task_;
   const StopFlag stop_;
+  Workspace& ws_;
   Scorer scorer_;
-  const PointSet points_;
   const std::size_t population_size_;
+  const int gene_count_;
   Candidate best_;
-  std::map<Chromosome, double> scores_;     // a converging population makes the same candidate again and again
   std::uint32_t evaluation_count_ = 0;
   bool corrected_ = false;
 };
 
 }  // namespace
 
+SearchResult find_space(const Colony& colony, const Params& params, const SearchTask& task, Workspace& workspace, StopFlag stop) {
+  return Search(colony, params, task, workspace, stop).run();
+}
+
 SearchResult find_space(const Colony& colony, const Params& params, const SearchTask& task, StopFlag stop) {
-  return Search(colony, params, task, stop).run();
+  Workspace workspace(params);
+  return find_space(colony, params, task, workspace, stop);
 }
 
 double retained_share(const Colony& colony, ContactRule rule, CellId cell_id, std::optional<CellId> excluded,

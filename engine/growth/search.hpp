@@ -14,6 +14,7 @@
 
 #include "engine/base/stop.hpp"
 #include "engine/growth/chromosome.hpp"
+#include "engine/growth/workspace.hpp"
 #include "engine/model/colony.hpp"
 #include "engine/random/sobol.hpp"
 
@@ -33,9 +34,13 @@ struct SearchResult {
   std::uint32_t evaluation_count = 0;
   bool corrected = false;
   bool crosses_wall = false;    // the winner reaches beyond the dish (on the fresh points): nothing better was found
+  Work work;
 };
 
-/// Throws Stopped when asked to (looked at before every candidate).
+/// `workspace` must be made from the same parameters. Throws Stopped when asked to (looked at before every generation).
+SearchResult find_space(const Colony& colony, const Params& params, const SearchTask& task, Workspace& workspace,
+                        StopFlag stop = nullptr);
+/// The same with a workspace of its own.
 SearchResult find_space(const Colony& colony, const Params& params, const SearchTask& task, StopFlag stop = nullptr);
 
 /// Share of its own volume that `cell_id` keeps beside its neighbours (without `excluded`, with `added`): hits of f~ over hits of f.

@@ -13,14 +13,18 @@
 #include "engine/model/params.hpp"
 #include "engine/random/sobol.hpp"
 #include "engine/shape/body.hpp"
+#include "engine/space/overlap.hpp"
 
 namespace colony {
 
 inline constexpr std::uint32_t kMembranePoints = 4096;
 inline constexpr std::uint32_t kMassPoints = 4096;
 inline constexpr std::uint32_t kIsolationPoints = 4096;
+inline constexpr std::uint32_t kIsolationPrefix = 256;   // looked at first
 
 /// The point nearest to `nucleus_um` (ties: the first) among the points outside f~; none if every point is inside.
+std::optional<Vec3> nearest_membrane_um(const Body& body, std::span<const Body* const> neighbours, ContactRule rule,
+                                        const Vec3& nucleus_um, const PointSet& points, OverlapScratch& scratch);
 std::optional<Vec3> nearest_membrane_um(const Body& body, std::span<const Body* const> neighbours, ContactRule rule,
                                         const Vec3& nucleus_um, const PointSet& points);
 

@@ -1,6 +1,7 @@
 // surroundings: how much room there is around a resting cell, and which sleepers a change wakes.
 // Method:  share of a disc of free_radius_um about the cell's centre that no body's noise-free projection covers (its own
-//          included), estimated on kFreeSharePoints scrambled Sobol points. While a cell sleeps its ordinal does not change, so
+//          included), estimated on those of kFreeSharePoints scrambled Sobol points of its square that lie in it; with layers, share of
+//          the ball above the dish that no noise-free body covers. While a cell sleeps its ordinal does not change, so
 //          every later estimate uses the same points as the recorded one: a growth is a change of the colony, not of the sample.
 // Units:   um; shares in [0, 1].
 // Random:  Purpose::kFreeShare by (cell, ordinal).        Threads: pure.

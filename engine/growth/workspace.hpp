@@ -3,11 +3,16 @@
 // Threads: one per worker, used by one thread at a time.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
-#include "engine/base/types.hpp"
+#include "engine/growth/candidate.hpp"
+#include "engine/growth/chromosome.hpp"
 #include "engine/model/params.hpp"
+#include "engine/random/sobol.hpp"
+#include "engine/space/overlap.hpp"
+#include "engine/space/pair_kernel.hpp"
 
 namespace colony {
 
@@ -26,9 +31,34 @@ struct Work {
   }
 };
 
+/// A candidate pair of a search.
+struct Candidate {
+  Chromosome chromosome;
+  double fitness = 0.0;                 // of a candidate that was given up: on the points looked at, and below the best
+};
+
 struct Workspace {
-  explicit Workspace(const Params&) {}
+  /// Tables for searches with these parameters, and only with these.
+  explicit Workspace(const Params& params);
+
+  // Fixed after construction.
+  GeneTables genes;
+  BitFlips mutation;
+  BitFlips correction;                  // of the low bits of all genes
+
+  // Buffers.
   std::vector<CellId> ids;
+  std::vector<const Body*> bodies;      // of ids
+  std::vector<const Body*> near;
+  std::vector<Candidate> population, bred;
+  kernel::SearchScene scene;
+  kernel::PairBuffers pair;
+  std::array<kernel::CandidateBody, 2> candidate;
+  std::vector<std::uint32_t> most_shared;
+  std::vector<std::pair<double, const Body*>> by_distance;
+  PointSet points, final_points, retained_points;
+  OverlapScratch overlap;
+  OverlapCounts counts;
 };
 
 }  // namespace colony

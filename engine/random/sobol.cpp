@@ -1,6 +1,12 @@
 #include "engine/random/sobol.hpp"
 
+#include <algorithm>
+#include <bit>
+#include <mutex>
+#include <utility>
+
 #include "engine/base/check.hpp"
+#include "engine/random/sobol_kernel.hpp"
 
 namespace colony {
 namespace {
@@ -72,25 +78,65 @@ std::uint32_t reverse_bits(std::uint32_t x) {
 // Each output bit depends only on lower input bits: on reversed bits that is a nested scrambling.
 std::uint32_t laine_karras(std::uint32_t x, std::uint32_t seed) {
   x += seed;
-  x ^= x * 0x6c50b47cU;
-  x ^= x * 0xb82f1e52U;
-  x ^= x * 0xc7afe638U;
-  x ^= x * 0x8d22f6e6U;
+  for (const std::uint32_t multiplier : kLaineKarras) x ^= x * multiplier;
   return x;
 }
 
 // The first three dimensions with their bits reversed, ready for scrambling.
-const std::array<std::vector<std::uint32_t>, 3>& reversed_points() {
-  static const std::array<std::vector<std::uint32_t>, 3> points = [] {
-    std::array<std::vector<std::uint32_t>, 3> made;
+using Reversed = std::array<std::vector<std::uint32_t>, 3>;
+
+const Reversed& reversed_points() {
+  static const Reversed points = [] {
+    Reversed made;
     for (int d = 0; d < 3; ++d) {
       auto& column = made[static_cast<std::size_t>(d)];
-      column.resize(kPointsMax);
+      column.resize(kPointsMax + kScramblePadding);
       for (std::uint32_t i = 0; i < kPointsMax; ++i) column[i] = reverse_bits(sobol_u32(i, d));
     }
     return made;
   }();
   return points;
+}
+
+// The first n points, tile by tile: a tile holds the 16 points (fewer if n is below 16) of one elementary interval of the first two
+// coordinates. Scrambling moves elementary intervals as wholes, so the points of a tile stay together.
+Reversed tiled_points(std::uint32_t n) {
+  const int bits = std::countr_zero(n);
+  const int tile_bits = std::max(bits - 4, 0);
+  const int x_bits = (tile_bits + 1) / 2;
+  const int y_bits = tile_bits / 2;
+  const auto top = [](std::uint32_t value, int count) { return count == 0 ? 0U : value >> (32 - count); };
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> order;  // tile, index
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const std::uint32_t x = top(sobol_u32(i, 0), x_bits);
+    const std::uint32_t y = top(sobol_u32(i, 1), y_bits);
+    order.emplace_back((x << y_bits) | y, i);
+  }
+  std::sort(order.begin(), order.end());
+  Reversed made;
+  for (std::size_t d = 0; d < 3; ++d) {
+    made[d].reserve(n + kScramblePadding);
+    for (const auto& [tile, index] : order) made[d].push_back(reversed_points()[d][index]);
+    made[d].resize(n + kScramblePadding);
+  }
+  return made;
+}
+
+const Reversed& tiled_points_of(std::uint32_t n) {
+  static std::array<std::once_flag, 17> once;
+  static std::array<Reversed, 17> sets;
+  const auto k = static_cast<std::size_t>(std::countr_zero(n));
+  std::call_once(once[k], [&] { sets[k] = tiled_points(n); });
+  return sets[k];
+}
+
+void scramble(const Reversed& reversed, std::uint32_t first, std::uint32_t n, const std::array<std::uint32_t, 3>& seeds, PointSet& out) {
+  out.count = n;
+  const std::array<std::vector<float>*, 3> columns = {&out.x, &out.y, &out.z};
+  for (std::size_t d = 0; d < 3; ++d) {
+    if (columns[d]->size() < n + kScramblePadding) columns[d]->resize(n + kScramblePadding);
+    scramble_column(reversed[d].data() + first, n, seeds[d], columns[d]->data());
+  }
 }
 
 }  // namespace
@@ -111,15 +157,12 @@ std::uint32_t owen_scramble(std::uint32_t value, std::uint32_t seed) {
 
 void scrambled_sobol(std::uint32_t n, const std::array<std::uint32_t, 3>& seeds, PointSet& out) {
   CHECK(n >= 1 && n <= kPointsMax && (n & (n - 1)) == 0);
-  const auto& reversed = reversed_points();
-  const std::array<std::vector<float>*, 3> columns = {&out.x, &out.y, &out.z};
-  for (std::size_t d = 0; d < 3; ++d) {
-    columns[d]->resize(n);
-    for (std::uint32_t i = 0; i < n; ++i) {
-      const std::uint32_t bits = reverse_bits(laine_karras(reversed[d][i], seeds[d]));
-      (*columns[d])[i] = static_cast<float>(bits >> 8) * 0x1.0p-24F;  // 24 bits: exact, below 1
-    }
-  }
+  scramble(reversed_points(), 0, n, seeds, out);
+}
+
+void tiled_sobol(std::uint32_t n, const std::array<std::uint32_t, 3>& seeds, PointSet& out) {
+  CHECK(n >= 1 && n <= kPointsMax && (n & (n - 1)) == 0);
+  scramble(tiled_points_of(n), 0, n, seeds, out);
 }
 
 PointSet scrambled_sobol(std::uint32_t n, Stream& stream) {

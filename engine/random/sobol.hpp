@@ -28,12 +28,17 @@ std::uint32_t owen_scramble(std::uint32_t value, std::uint32_t seed);
 /// n points of the unit cube as three arrays, scrambled by three seeds; single precision (24 bits), each in [0, 1).
 /// Single precision because that is what the overlap kernel works in.
 struct PointSet {
-  std::vector<float> x, y, z;
-  std::size_t size() const { return x.size(); }
+  std::vector<float> x, y, z;    // longer than `count`: kernels read and write whole vectors
+  std::size_t count = 0;
+  std::size_t size() const { return count; }
 };
 
-/// Unscrambled in 32 bits, computed once for the largest n and shared; scrambled into `out` (resized to n).
+/// Unscrambled in 32 bits, computed once for the largest n and shared; scrambled into `out`.
 void scrambled_sobol(std::uint32_t n, const std::array<std::uint32_t, 3>& seeds, PointSet& out);
+
+/// The same points tile by tile: each run of 16 holds the points of one elementary interval of x and y, so that they lie close together
+/// in the unit cube, scrambled or not, and a vector of them is mostly of one opinion about a body.
+void tiled_sobol(std::uint32_t n, const std::array<std::uint32_t, 3>& seeds, PointSet& out);
 
 /// The same with the next three words of `stream` as seeds.
 PointSet scrambled_sobol(std::uint32_t n, Stream& stream);

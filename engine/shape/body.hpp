@@ -56,6 +56,8 @@ class Body {
   double half_width_um(const Vec3& unit) const;
   /// True if (x, y) lies in the vertical projection of the noise-free ellipsoid.
   bool footprint_contains(double x_um, double y_um) const;
+  /// (xx, xy, yy) of that projection: xx dx^2 + 2 xy dx dy + yy dy^2 <= 1.
+  Vec3 footprint_form() const { return {footprint_xx_, footprint_xy_, footprint_yy_}; }
   /// Half extents of that projection along x and y, um.
   Vec2 footprint_half_extent_um() const;
   const Vec3& centre_um() const { return centre_; }

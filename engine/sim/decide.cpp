@@ -10,32 +10,37 @@
 #include "engine/growth/splitting.hpp"
 #include "engine/growth/surroundings.hpp"
 #include "engine/model/cycle.hpp"
+#include "engine/random/sobol.hpp"
 #include "engine/space/overlap.hpp"
 
 namespace colony {
 namespace {
 
-PointSet points_for(Seed seed, const Cell& cell, Purpose purpose, std::uint32_t lane, std::uint32_t n) {
+std::array<std::uint32_t, 3> seeds_for(Seed seed, const Cell& cell, Purpose purpose, std::uint32_t lane) {
   Stream stream(seed, cell.id, cell.ordinal, purpose, lane);
-  return scrambled_sobol(n, stream);
+  return {stream.next_u32(), stream.next_u32(), stream.next_u32()};
 }
 
-std::vector<const Body*> neighbours_of(const Colony& colony, CellId id) {
-  std::vector<CellId> ids;
-  colony.cells_meeting(colony.body(id).box(), ids);
-  std::vector<const Body*> bodies;
-  for (const CellId other : ids) {
-    if (other != id) bodies.push_back(&colony.body(other));
+// All cells whose boxes meet that of `id`, but itself, into workspace.near.
+const std::vector<const Body*>& neighbours_of(const Colony& colony, CellId id, Workspace& workspace) {
+  colony.cells_meeting(colony.body(id).box(), workspace.ids);
+  workspace.near.clear();
+  for (const CellId other : workspace.ids) {
+    if (other != id) workspace.near.push_back(&colony.body(other));
   }
-  return bodies;
+  return workspace.near;
 }
 
-bool is_isolated(const Colony& colony, Seed seed, const Cell& cell) {
-  const std::vector<const Body*> neighbours = neighbours_of(colony, cell.id);
+bool is_isolated(const Colony& colony, Seed seed, const Cell& cell, Workspace& workspace) {
+  const std::vector<const Body*>& neighbours = neighbours_of(colony, cell.id, workspace);
   if (neighbours.empty()) return true;
-  const PointSet points = points_for(seed, cell, Purpose::kIsolation, 0, kIsolationPoints);
-  for (const Body* other : neighbours) {
-    if (touches(colony.body(cell.id), *other, points)) return false;
+  const std::array<std::uint32_t, 3> seeds = seeds_for(seed, cell, Purpose::kIsolation, 0);
+  // Most cells touch somebody, and the first points of the set show it.
+  for (const std::uint32_t n : {kIsolationPrefix, kIsolationPoints}) {
+    scrambled_sobol(n, seeds, workspace.points);
+    for (const Body* other : neighbours) {
+      if (touches(colony.body(cell.id), *other, workspace.points, workspace.overlap)) return false;
+    }
   }
   return true;
 }
@@ -46,9 +51,9 @@ Vec3 random_direction(Seed seed, const Cell& cell) {
   return {c, s, 0.0};
 }
 
-Vec3 splitting_direction(const Colony& colony, Seed seed, const Cell& cell) {
+Vec3 splitting_direction(const Colony& colony, Seed seed, const Cell& cell, Workspace& workspace) {
   CHECK(cell.nearest_membrane_um.has_value());  // settling comes before every division: validate() sees to it
-  if (is_isolated(colony, seed, cell)) return random_direction(seed, cell);
+  if (is_isolated(colony, seed, cell, workspace)) return random_direction(seed, cell);
   return splitting_normal(cell.nucleus_um, *cell.nearest_membrane_um).value_or(random_direction(seed, cell));
 }
 
@@ -97,7 +102,7 @@ Inhibited inhibited(const Colony& colony, const Params& params, Seed seed, const
 
 }  // namespace
 
-Decision decide_division(const Colony& colony, const Params& params, Seed seed, CellId id, double time_h, Workspace&,
+Decision decide_division(const Colony& colony, const Params& params, Seed seed, CellId id, double time_h, Workspace& workspace,
                          StopFlag stop) {
   const Cell& parent = colony.cell(id);
   if (params.division.generation_limit && parent.generation >= *params.division.generation_limit) return {Senesced{}, {}};
@@ -107,14 +112,14 @@ Decision decide_division(const Colony& colony, const Params& params, Seed seed, 
   task.cell_id = id;
   task.ordinal = parent.ordinal;
   task.frame.pivot_um = parent.nucleus_um;
-  task.frame.direction = splitting_direction(colony, seed, parent);
+  task.frame.direction = splitting_direction(colony, seed, parent, workspace);
   for (std::uint32_t lane = 0; lane < 2; ++lane) {
     task.frame.noise_offsets[lane] = draw_noise_offset(params, seed, parent, lane);
   }
-  const SearchResult found = find_space(colony, params, task, stop);
+  const SearchResult found = find_space(colony, params, task, workspace, stop);
   // The dish's wall is hard also where inhibition is off.
   if (found.crosses_wall || (params.division.inhibition && !(found.fitness >= params.contact.fitness_min))) {
-    return {inhibited(colony, params, seed, parent, time_h, found), {}};
+    return {inhibited(colony, params, seed, parent, time_h, found), found.work};
   }
 
   Divided event;
@@ -134,25 +139,25 @@ Decision decide_division(const Colony& colony, const Params& params, Seed seed, 
   event.corrected = found.corrected;
   const std::array<Body, 2> bodies = {Body(found.pair.bodies[0], params.noise), Body(found.pair.bodies[1], params.noise)};
   event.woken = wake_sleepers(colony, params, seed, time_h, {id, bodies});
-  return {event, {}};
+  return {event, found.work};
 }
 
-Decision decide_settling(const Colony& colony, const Params& params, Seed seed, CellId id, Workspace&) {
+Decision decide_settling(const Colony& colony, const Params& params, Seed seed, CellId id, Workspace& workspace) {
   const Cell& cell = colony.cell(id);
   const Body& body = colony.body(id);
-  const std::vector<const Body*> neighbours = neighbours_of(colony, id);
+  const std::vector<const Body*>& neighbours = neighbours_of(colony, id, workspace);
   const ContactRule rule = params.contact.rule;
-  const MassEstimate mass =
-      deformed_mass(body, neighbours, rule, points_for(seed, cell, Purpose::kSettlePoints, 0, kMassPoints));
+  tiled_sobol(kMassPoints, seeds_for(seed, cell, Purpose::kSettlePoints, 0), workspace.points);
+  const MassEstimate mass = deformed_mass(body, neighbours, rule, workspace.points, workspace.overlap);
   Settled event;
   // A cell pressed to nothing has no centre of mass: its nucleus stays where it was.
   event.nucleus_um = mass.hit_count > 0 ? mass.centre_um : cell.nucleus_um;
   event.deformed_volume_um3 = mass.volume_um3;
   event.due_h = cell.due_h;
+  tiled_sobol(kMembranePoints, seeds_for(seed, cell, Purpose::kSettlePoints, 1), workspace.points);
   // Inside everywhere in the slab cannot happen for a body within its own box; then the centre stands for m: no plane is fixed.
-  event.nearest_membrane_um = nearest_membrane_um(body, neighbours, rule, event.nucleus_um,
-                                                  points_for(seed, cell, Purpose::kSettlePoints, 1, kMembranePoints))
-                                  .value_or(event.nucleus_um);
+  event.nearest_membrane_um =
+      nearest_membrane_um(body, neighbours, rule, event.nucleus_um, workspace.points, workspace.overlap).value_or(event.nucleus_um);
   return {event, {}};
 }
 

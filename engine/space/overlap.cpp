@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "engine/base/check.hpp"
+#include "engine/space/deformed_kernel.hpp"
 #include "engine/space/overlap_kernel.hpp"
 
 namespace colony {
@@ -20,7 +21,8 @@ void check_points(const PointSet& points) {
 struct Placement {
   Vec3 origin;
   float low[3], extent[3];
-  explicit Placement(const Box& box) : origin(0.5 * (box.low + box.high)) {
+  explicit Placement(const Box& box) : Placement(box, 0.5 * (box.low + box.high)) {}
+  Placement(const Box& box, const Vec3& origin_um) : origin(origin_um) {
     for (int i = 0; i < 3; ++i) {
       low[i] = static_cast<float>(box.low[i] - origin[i]);
       extent[i] = static_cast<float>(box.high[i] - box.low[i]);
@@ -135,15 +137,23 @@ double interpenetration_volume_um3(const Body& a, const Body& b, const PointSet&
   return domain.volume() * hits / static_cast<double>(points.size());
 }
 
-bool touches(const Body& a, const Body& b, const PointSet& points) {
+bool touches(const Body& a, const Body& b, const PointSet& points, OverlapScratch& s) {
   check_points(points);
   const Box domain = admissible_domain(a, b);
-  if (domain.empty()) return false;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const Vec3 p = placed_um(domain, points, i);
-    if (a.contains(p) && b.contains(p)) return true;
-  }
-  return false;
+  if (domain.empty() || separated(a, b)) return false;
+  const Placement placement(domain);
+  place(placement, points, s);
+  hold(s.inside_x, points.size());
+  hold(s.inside_y, points.size());
+  hold(s.inside_z, points.size());
+  const std::uint32_t in_a = kernel::select_inside(FloatBody(a, placement.origin), s.x.data(), s.y.data(), s.z.data(), points.size(), s.band,
+                                                   s.inside_x.data(), s.inside_y.data(), s.inside_z.data());
+  return kernel::count_inside(FloatBody(b, placement.origin), s.inside_x.data(), s.inside_y.data(), s.inside_z.data(), in_a, s.band) > 0;
+}
+
+bool touches(const Body& a, const Body& b, const PointSet& points) {
+  OverlapScratch scratch;
+  return touches(a, b, points, scratch);
 }
 
 bool deformed_contains(const Body& body, std::span<const Body* const> neighbours, ContactRule rule, const Vec3& point_um) {
@@ -152,21 +162,59 @@ bool deformed_contains(const Body& body, std::span<const Body* const> neighbours
   return taken == 0.0 || body.field(point_um) - taken >= 0.0;
 }
 
-MassEstimate deformed_mass(const Body& body, std::span<const Body* const> neighbours, ContactRule rule, const PointSet& points) {
+namespace {
+
+// Flags in s.flags; the points placed in `box` stand in s.x, s.y, s.z, relative to `origin`.
+void flag_deformed_in(const Box& box, const Vec3& origin, const Body& body, std::span<const Body* const> neighbours, ContactRule rule,
+                      const PointSet& points, OverlapScratch& s) {
+  Placement placement(box, origin);
+  place(placement, points, s);
+  s.bodies.clear();
+  for (const Body* other : neighbours) {
+    if (meets(other->box(), box) && !separated(*other, body)) s.bodies.emplace_back(*other, origin);
+  }
+  s.flags.resize(points.size());
+  kernel::flag_deformed(FloatBody(body, origin), s.bodies, rule == ContactRule::kMax, s.x.data(), s.y.data(), s.z.data(), points.size(),
+                        s.flags.data());
+}
+
+}  // namespace
+
+MassEstimate deformed_mass(const Body& body, std::span<const Body* const> neighbours, ContactRule rule, const PointSet& points,
+                           OverlapScratch& s) {
   check_points(points);
   MassEstimate mass;
   mass.centre_um = body.centre_um();
-  if (body.box().empty()) return mass;
-  Vec3 sum = Vec3::Zero();  // in index order: the sum's bits depend on it
+  const Box& box = body.box();
+  if (box.empty()) return mass;
+  flag_deformed_in(box, 0.5 * (box.low + box.high), body, neighbours, rule, points, s);
+  // Coordinates of the unit cube have 24 bits: these sums are exact, in any order.
+  double sum[3] = {0.0, 0.0, 0.0};
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const Vec3 p = placed_um(body.box(), points, i);
-    if (!deformed_contains(body, neighbours, rule, p)) continue;
-    ++mass.hit_count;
-    sum += p - body.centre_um();
+    const double counts = s.flags[i];
+    mass.hit_count += s.flags[i];
+    sum[0] += counts * static_cast<double>(points.x[i]);
+    sum[1] += counts * static_cast<double>(points.y[i]);
+    sum[2] += counts * static_cast<double>(points.z[i]);
   }
-  mass.volume_um3 = body.box().volume() * mass.hit_count / static_cast<double>(points.size());
-  if (mass.hit_count > 0) mass.centre_um += sum / static_cast<double>(mass.hit_count);
+  mass.volume_um3 = box.volume() * mass.hit_count / static_cast<double>(points.size());
+  if (mass.hit_count == 0) return mass;
+  for (int i = 0; i < 3; ++i) mass.centre_um[i] = box.low[i] + (box.high[i] - box.low[i]) * (sum[i] / mass.hit_count);
   return mass;
+}
+
+MassEstimate deformed_mass(const Body& body, std::span<const Body* const> neighbours, ContactRule rule, const PointSet& points) {
+  OverlapScratch scratch;
+  return deformed_mass(body, neighbours, rule, points, scratch);
+}
+
+std::optional<Vec3> nearest_outside_um(const Box& box, const Vec3& from_um, const Body& body, std::span<const Body* const> neighbours,
+                                       ContactRule rule, const PointSet& points, OverlapScratch& s) {
+  check_points(points);
+  flag_deformed_in(box, from_um, body, neighbours, rule, points, s);
+  const std::size_t nearest = kernel::nearest_unflagged(s.x.data(), s.y.data(), s.z.data(), points.size(), s.flags.data());
+  if (nearest == points.size()) return std::nullopt;
+  return placed_um(box, points, nearest);
 }
 
 }  // namespace colony

@@ -37,6 +37,8 @@ struct OverlapScratch {
   std::vector<float> x, y, z;                  // points under test
   std::vector<float> inside_x, inside_y, inside_z;
   kernel::BandBuffer band;
+  std::vector<kernel::FloatBody> bodies;
+  std::vector<std::uint8_t> flags;
 };
 
 /// Counts for `body` against each of `neighbours` (any that cannot touch count 0). `wall_radius_um`: the dish, centred at the origin.
@@ -55,15 +57,24 @@ double interpenetration_volume_um3(const Body& a, const Body& b, const PointSet&
 Box admissible_domain(const Body& a, const Body& b);
 
 /// The interference relation S = 1: some point of the domain has min(f_a, f_b) >= 0.
+bool touches(const Body& a, const Body& b, const PointSet& points, OverlapScratch& scratch);
 bool touches(const Body& a, const Body& b, const PointSet& points);
 
-/// Volume and centre of mass of the deformed body (the undeformed one if `neighbours` is empty), above the dish.
+/// Volume and centre of mass of the deformed body (the undeformed one if `neighbours` is empty), above the dish. Single precision at
+/// the points, exact sums.
 struct MassEstimate {
   double volume_um3 = 0.0;
   Vec3 centre_um = Vec3::Zero();               // the body's centre if there is no hit
   std::uint32_t hit_count = 0;
 };
+MassEstimate deformed_mass(const Body& body, std::span<const Body* const> neighbours, ContactRule rule, const PointSet& points,
+                           OverlapScratch& scratch);
 MassEstimate deformed_mass(const Body& body, std::span<const Body* const> neighbours, ContactRule rule, const PointSet& points);
+
+/// The point nearest to `from_um` (ties: the first) among the points placed in `box` that lie outside the deformed body; none if all are
+/// inside.
+std::optional<Vec3> nearest_outside_um(const Box& box, const Vec3& from_um, const Body& body, std::span<const Body* const> neighbours,
+                                       ContactRule rule, const PointSet& points, OverlapScratch& scratch);
 
 /// True if f~ >= 0 at p (z >= 0), with as few evaluations as the signs allow.
 bool deformed_contains(const Body& body, std::span<const Body* const> neighbours, ContactRule rule, const Vec3& point_um);

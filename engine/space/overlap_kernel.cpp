@@ -2,6 +2,7 @@
 #include "engine/space/overlap_kernel.hpp"
 
 #include "engine/base/maths.hpp"
+#include "engine/space/deformed_kernel.hpp"
 
 namespace colony::kernel {
 namespace {
@@ -66,12 +67,44 @@ float noise_reference(const FloatBody& b, float u, float v, float w) {
   return (gx * gy) * gz;
 }
 
-bool is_inside_reference(const FloatBody& b, float x, float y, float z) {
+namespace {
+
+float smooth_at(const FloatBody& b, float x, float y, float z, float& noise) {
   const float u = ((b.m[0] * x + b.m[1] * y) + b.m[2] * z) + b.t[0];
   const float v = ((b.m[3] * x + b.m[4] * y) + b.m[5] * z) + b.t[1];
   const float w = ((b.m[6] * x + b.m[7] * y) + b.m[8] * z) + b.t[2];
-  const float smooth = ((1.0F - u * u) - v * v) - w * w;
-  return smooth + noise_reference(b, u, v, w) >= 0.0F;
+  noise = noise_reference(b, u, v, w);
+  return ((1.0F - u * u) - v * v) - w * w;
+}
+
+}  // namespace
+
+bool is_inside_reference(const FloatBody& b, float x, float y, float z) {
+  float noise = 0.0F;
+  const float smooth = smooth_at(b, x, y, z, noise);
+  return smooth + noise >= 0.0F;
+}
+
+bool is_in_deformed_reference(const FloatBody& body, std::span<const FloatBody> neighbours, bool largest_only, float x, float y, float z) {
+  float taken = 0.0F;
+  float noise = 0.0F;
+  for (const FloatBody& other : neighbours) {
+    const float smooth = smooth_at(other, x, y, z, noise);
+    const float field = smooth + noise;
+    const float takes = field > 0.0F ? field : 0.0F;
+    taken = largest_only ? (takes > taken ? takes : taken) : taken + takes;
+  }
+  const float smooth = smooth_at(body, x, y, z, noise);
+  return (smooth + noise) - taken >= 0.0F;
+}
+
+bool is_covered_reference(const Cover& c, float x, float y, float z) {
+  const float dx = x - c.centre[0];
+  const float dy = y - c.centre[1];
+  const float dz = z - c.centre[2];
+  const float squares = (c.xx * (dx * dx) + c.yy * (dy * dy)) + c.zz * (dz * dz);
+  const float products = (c.xy * (dx * dy) + c.xz * (dx * dz)) + c.yz * (dy * dz);
+  return squares + (products + products) <= 1.0F;
 }
 
 }  // namespace colony::kernel

@@ -67,10 +67,11 @@ void run(const Scene& scene) {
   const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const Colony& colony = simulator.colony();
   const auto per = [](std::uint64_t n, std::uint64_t d) { return static_cast<double>(n) / static_cast<double>(d > 0 ? d : 1); };
-  std::printf("%s,1,%s,%zu,%.1f,%.3f,%.1f,%.1f,%.3f,%.1f,%.3f,%.1f,%s\n", std::string(scene.name).c_str(), kernel::vector_target(),
+  std::printf("%s,1,%s,%zu,%.1f,%.3f,%.1f,%.1f,%.3f,%.1f,%.3f,%.0f,%.3f,%.2f,%.1f,%s\n", std::string(scene.name).c_str(), kernel::vector_target(),
               colony.cells().size(), colony.time_h(), wall_s, static_cast<double>(colony.cells().size()) / wall_s,
               static_cast<double>(counts.divisions) / wall_s, per(counts.searches, counts.divisions),
-              per(counts.evaluations, counts.divisions), per(counts.corrected, counts.searches), peak_memory_mib(),
+              per(counts.evaluations, counts.divisions), per(counts.corrected, counts.searches), per(simulator.work().field_count, counts.divisions),
+              per(simulator.work().noise_count, simulator.work().field_count), 1e9 * wall_s / static_cast<double>(simulator.work().field_count), peak_memory_mib(),
               colony.digest().hex().c_str());
   std::fflush(stdout);
 }
@@ -92,7 +93,7 @@ int main(int argc, char** argv) {
     }
   }
   std::printf("scene,threads,vector_target,cells,time_h,wall_s,cells_per_s,divisions_per_s,searches_per_division,"
-              "evaluations_per_division,corrected_share,peak_memory_mib,digest\n");
+              "evaluations_per_division,corrected_share,field_evaluations_per_division,band_share,ns_per_evaluation,peak_memory_mib,digest\n");
   for (const Scene& scene : scenes()) {
     bool wanted = names.empty();
     for (const std::string_view name : names) wanted = wanted || scene.name == name;

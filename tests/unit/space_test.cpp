@@ -155,7 +155,7 @@ TEST(CountOverlaps, PointCountsThatAreNoPowerOfTwoInRangeFailACheck) {
   OverlapScratch scratch;
   OverlapCounts out;
   PointSet points = testing::points(64, 1);
-  points.x.resize(63);
+  points.count = 63;
   EXPECT_THROW(count_overlaps(body, {}, std::nullopt, points, scratch, out), CheckFailure);
   EXPECT_THROW(count_overlaps(body, {}, std::nullopt, testing::points(32, 1), scratch, out), CheckFailure);
 }

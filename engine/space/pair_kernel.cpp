@@ -1,0 +1,123 @@
+// Preparation of searches, and the plain C++ twin of the vector kernels (pair_simd.cpp).
+#include "engine/space/pair_kernel.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/base/check.hpp"
+
+namespace colony::kernel {
+namespace {
+
+void pad(std::vector<float>& values, std::size_t n) {
+  if (values.size() < n + kPadding) values.resize(n + kPadding);
+}
+
+// Orders directions in the plane like the angle does, without trigonometry: 0..4.
+float pseudo_angle(float u, float v) {
+  const float sum = std::abs(u) + std::abs(v);
+  if (!(sum > 0.0F)) return 0.0F;
+  const float quarter = v / sum;
+  if (u < 0.0F) return 2.0F - quarter;
+  return v < 0.0F ? 4.0F + quarter : quarter;
+}
+
+}  // namespace
+
+void NeighbourSet::clear() { bodies.clear(); }
+
+void NeighbourSet::add(const Body& body, const Vec3& origin_um) {
+  const std::size_t j = bodies.size();
+  bodies.emplace_back(body, origin_um);
+  for (std::size_t i = 0; i < 3; ++i) {
+    pad(centre[i], j + 1);
+    pad(half[i], j + 1);
+    centre[i][j] = static_cast<float>(body.centre_um()[static_cast<int>(i)] - origin_um[static_cast<int>(i)]);
+  }
+  Mat3 covariance = Mat3::Zero();
+  for (int i = 0; i < 3; ++i) {
+    // The rows of to_unit are the axes over the semiaxes.
+    const Vec3 axis = body.to_unit().row(i).transpose() * (body.semiaxes_um()[i] * body.semiaxes_um()[i] * body.noisy_scale());
+    covariance += axis * axis.transpose();
+  }
+  constexpr int kRows[6] = {0, 1, 2, 0, 0, 1};
+  constexpr int kColumns[6] = {0, 1, 2, 1, 2, 2};
+  for (std::size_t k = 0; k < 6; ++k) {
+    pad(form[k], j + 1);
+    form[k][j] = static_cast<float>(covariance(kRows[k], kColumns[k]));
+  }
+  for (std::size_t i = 0; i < 3; ++i) half[i][j] = std::sqrt(form[i][j]);
+}
+
+void select_own_points(const FloatBody& field, float noisy_scale, const PointSet& unit_points, OwnPoints& out) {
+  const std::size_t n = unit_points.size();
+  FloatBody unit = field;
+  for (int i = 0; i < 9; ++i) unit.m[i] = i % 4 == 0 ? 1.0F : 0.0F;
+  for (float& shift : unit.t) shift = 0.0F;
+  for (std::vector<float>* column : {&out.u, &out.v, &out.w}) pad(*column, n);
+  const float width = 2.0F * noisy_scale;
+  for (std::size_t i = 0; i < n; ++i) {
+    out.u[i] = unit_points.x[i] * width - noisy_scale;
+    out.v[i] = unit_points.y[i] * width - noisy_scale;
+    out.w[i] = unit_points.z[i] * width - noisy_scale;
+  }
+  out.flags.resize(n + kPadding);
+  flag_inside(unit, out.u.data(), out.v.data(), out.w.data(), n, out.flags.data());
+  std::uint32_t inside = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (out.flags[i] == 0) continue;
+    out.u[inside] = out.u[i];
+    out.v[inside] = out.v[i];
+    out.w[inside] = out.w[i];
+    ++inside;
+  }
+  out.stage_ends.clear();
+  std::uint32_t end = 0;
+  for (const std::uint32_t size : kStageSizes) out.stage_ends.push_back(end = std::min(inside, end + size));
+  out.stage_ends.push_back(inside);
+
+  std::uint32_t first = 0;
+  for (const std::uint32_t last : out.stage_ends) {
+    out.order.clear();
+    for (std::uint32_t i = first; i < last; ++i) out.order.push_back({pseudo_angle(out.u[i], out.v[i]), out.u[i], out.v[i], out.w[i]});
+    std::sort(out.order.begin(), out.order.end());  // all four numbers: one order only
+    for (std::uint32_t i = first; i < last; ++i) {
+      out.u[i] = out.order[i - first][1];
+      out.v[i] = out.order[i - first][2];
+      out.w[i] = out.order[i - first][3];
+    }
+    first = last;
+  }
+}
+
+PairScore score_pair_reference(const SearchScene& scene, const std::array<CandidateBody, 2>& pair) {
+  PairScore score;
+  for (std::size_t k = 0; k < 2; ++k) {
+    const OwnPoints& own = scene.own[k];
+    const CandidateBody& body = pair[k];
+    const auto coordinate = [&](int axis, std::size_t i) {
+      const float* a = body.axes + 3 * axis;
+      return ((a[0] * own.u[i] + a[1] * own.v[i]) + a[2] * own.w[i]) + body.centre[axis];
+    };
+    for (std::size_t i = 0; i < own.size(); ++i) {
+      const float x = coordinate(0, i);
+      const float y = coordinate(1, i);
+      const float z = coordinate(2, i);
+      if (!(z >= scene.dish_z)) continue;
+      ++score.hits[k];
+      const float wx = x - scene.wall_x;
+      const float wy = y - scene.wall_y;
+      if (scene.has_wall && wx * wx + wy * wy > scene.wall_radius2) score.beyond_wall = true;
+      if (is_inside_reference(pair[1 - k].field, x, y, z)) {
+        ++score.sibling[k];
+        ++score.shared[k];
+      }
+      for (const FloatBody& other : scene.neighbours.bodies) {
+        if (is_inside_reference(other, x, y, z)) ++score.shared[k];
+      }
+    }
+  }
+  return score;
+}
+
+}  // namespace colony::kernel

@@ -1,0 +1,97 @@
+// pair_kernel: how much of a candidate pair's two bodies lies inside their neighbours: what the search for free space spends its time on.
+// Method:  points are given once a search in the unit frame of each body (u, v, w), where the body's own field, noise included, is
+//          the same for every candidate: only the points inside it are kept. A candidate maps them to the dish by its affine frame;
+//          those below the dish drop out; the rest are tested against the neighbours that can reach the body. The field of a
+//          neighbour is evaluated without the noise, and with it only where that decides the sign.
+//          Scoring goes through the points in stages and gives up once too many are shared (ShareLimit).
+// Units:   um relative to the search's origin, single precision.
+// Why the same bits everywhere: as overlap_kernel.hpp: + - * and compares in a fixed order per point; integers leave the kernel.
+// Threads: pure but for the caller's buffers.
+// Source:  the paper, 4.1 and 4.3; the common points of all candidates are ours (engine/DESIGN.md).
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "engine/random/sobol.hpp"
+#include "engine/space/overlap_kernel.hpp"
+
+namespace colony::kernel {
+
+/// Points of the unit frame inside the noisy body, in the order of the Sobol points but sorted by direction inside each stage, so that
+/// the points of one vector lie close together and most vectors need no noise. Stage k ends before stage_ends[k].
+struct OwnPoints {
+  std::vector<float> u, v, w;           // padded by kPadding
+  std::vector<std::uint32_t> stage_ends;
+  std::vector<std::uint8_t> flags;      // scratch of select_own_points
+  std::vector<std::array<float, 4>> order;
+  std::size_t size() const { return stage_ends.empty() ? 0 : stage_ends.back(); }
+};
+
+/// Sizes of the stages but the last, which takes what is left. Multiples of 16, the most lanes of any target.
+inline constexpr std::array<std::uint32_t, 2> kStageSizes = {32, 32};
+
+/// A candidate body: p = axes (u, v, w) + centre. `form`: noise scale squared times axes axes^T as xx, yy, zz, xy, xz, yz.
+struct CandidateBody {
+  float axes[9];                        // row-major
+  float centre[3];
+  float form[6];
+  FloatBody field;                      // the same body as its sibling's neighbour
+};
+
+/// The bodies a search can meet, nearest to the origin first (padded arrays).
+struct NeighbourSet {
+  std::vector<FloatBody> bodies;
+  std::array<std::vector<float>, 3> centre;
+  std::array<std::vector<float>, 6> form;   // as CandidateBody::form
+  std::array<std::vector<float>, 3> half;   // half extents: roots of form's first three
+  std::size_t size() const { return bodies.size(); }
+  void clear();
+  void add(const Body& body, const Vec3& origin_um);
+};
+
+/// What is fixed during one search.
+struct SearchScene {
+  std::array<OwnPoints, 2> own;
+  NeighbourSet neighbours;
+  float dish_z = 0.0F;                       // the plane z = 0, relative to the origin
+  bool has_wall = false;
+  float wall_x = 0.0F, wall_y = 0.0F;        // the dish's centre, relative to the origin
+  float wall_radius2 = 0.0F;
+};
+
+struct PairScore {
+  std::array<std::uint32_t, 2> hits = {0, 0};     // points of the body above the dish, as far as they were looked at
+  std::array<std::uint32_t, 2> shared = {0, 0};   // of those, summed over the neighbours that hold them, the sibling included
+  std::array<std::uint32_t, 2> sibling = {0, 0};  // of those, inside the sibling
+  bool dropped = false;                           // given up: the counts are those of a prefix
+  bool beyond_wall = false;                       // a hit lies beyond the dish's wall
+};
+
+/// most_shared[h]: a body with more than this many shared among its first h hits is given up. Empty: nobody is.
+using ShareLimit = std::span<const std::uint32_t>;
+
+struct PairBuffers {
+  std::vector<float> x, y, z;
+  std::array<std::vector<std::uint32_t>, 2> near;
+  std::uint64_t field_count = 0;             // evaluations of a neighbour's field
+  std::uint64_t noise_count = 0;             // of those, with noise
+};
+
+PairScore score_pair(const SearchScene& scene, const std::array<CandidateBody, 2>& pair, ShareLimit most_shared, PairBuffers& buffers);
+
+/// The brute-force twin: every point, every neighbour, noise always, nobody given up. The same counts to the last bit.
+PairScore score_pair_reference(const SearchScene& scene, const std::array<CandidateBody, 2>& pair);
+
+/// Fills flags[0..n) with 1 where the point is inside `body`, else 0.
+void flag_inside(const FloatBody& body, const float* x, const float* y, const float* z, std::size_t n, std::uint8_t* flags);
+
+/// The points of `unit_points` (in [0, 1)^3, mapped on the cube of half edge `noisy_scale`) inside a body with this noise, in stages.
+/// `field`: any body with that noise; only its noise is read.
+void select_own_points(const FloatBody& field, float noisy_scale, const PointSet& unit_points, OwnPoints& out);
+
+}  // namespace colony::kernel
