@@ -1,5 +1,6 @@
 #include "engine/growth/candidate.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "engine/base/check.hpp"
@@ -105,13 +106,8 @@ void GeneTables::decode(const Chromosome& chromosome, const PairFrame& frame, st
       const float* m = body.field.m + 3 * i;
       body.field.t[i] = -((m[0] * body.centre[0] + m[1] * body.centre[1]) + m[2] * body.centre[2]);
     }
-    constexpr int kRows[6] = {0, 1, 2, 0, 0, 1};
-    constexpr int kColumns[6] = {0, 1, 2, 1, 2, 2};
-    for (int entry = 0; entry < 6; ++entry) {
-      const float* p = body.axes + 3 * kRows[entry];
-      const float* q = body.axes + 3 * kColumns[entry];
-      body.form[entry] = (noisy_scale_ * noisy_scale_) * ((p[0] * q[0] + p[1] * q[1]) + p[2] * q[2]);
-    }
+    // In a monolayer the longest axis lies nearly flat; no point is further from the centre than it.
+    body.reach = std::max(std::abs(body.centre[0]), std::abs(body.centre[1])) + noisy_scale_ * std::max({a, b, c});
   }
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <tuple>
 #include <utility>
 
 #include "engine/base/check.hpp"
@@ -35,18 +36,22 @@ class Scorer {
     colony.cells_meeting(area, ws_.ids);
     std::erase(ws_.ids, task.cell_id);
     ws_.bodies.clear();
-    ws_.by_distance.clear();
+    ws_.by_gap.clear();
     for (const CellId id : ws_.ids) {
       const Body& body = colony.body(id);
       ws_.bodies.push_back(&body);
-      ws_.by_distance.emplace_back((body.centre_um() - c).squaredNorm(), &body);
+      const Box& box = body.box();
+      const double gap = std::max({box.low.x() - c.x(), c.x() - box.high.x(), box.low.y() - c.y(), c.y() - box.high.y()});
+      ws_.by_gap.push_back({static_cast<float>(gap), id, &body});
     }
-    // The nearest first: they are the likeliest to be overlapped, so a hopeless candidate is given up early. A stable sort of
-    // ascending ids: one order only.
-    std::stable_sort(ws_.by_distance.begin(), ws_.by_distance.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+    std::sort(ws_.by_gap.begin(), ws_.by_gap.end(), [](const auto& a, const auto& b) { return std::tie(a.gap_um, a.id) < std::tie(b.gap_um, b.id); });
     kernel::SearchScene& scene = ws_.scene;
-    scene.neighbours.clear();
-    for (const auto& [distance, body] : ws_.by_distance) scene.neighbours.add(*body, c);
+    ws_.voxels.centre_on(c);
+    scene.counts = ws_.voxels.counts();
+    scene.voxels_x = ws_.voxels.nx();
+    scene.voxels_z = ws_.voxels.nz();
+    scene.voxels_per_um = static_cast<float>(1.0 / ws_.voxels.edge_um());
+    for (int i = 0; i < 3; ++i) scene.voxel_corner[i] = static_cast<float>(ws_.voxels.corner_um()[i] - c[i]);
     scene.dish_z = static_cast<float>(-c.z());
     scene.has_wall = false;
     if (params.dish.radius_um) {
@@ -90,6 +95,7 @@ class Scorer {
   double score(const Chromosome& chromosome) {
     ws_.genes.decode(chromosome, task_.frame, ws_.candidate);
     const kernel::ShareLimit limit = racing_ ? kernel::ShareLimit(ws_.most_shared) : kernel::ShareLimit();
+    cover(std::max(ws_.candidate[0].reach, ws_.candidate[1].reach));
     const kernel::PairScore score = kernel::score_pair(ws_.scene, ws_.candidate, limit, ws_.pair);
     if (score.beyond_wall) return 0.0;
     double fitness = 1.0;
@@ -112,8 +118,8 @@ class Scorer {
     for (std::size_t k = 0; k < 2; ++k) {
       ws_.near.clear();
       ws_.near.push_back(&bodies[1 - k]);
-      for (const auto& [distance, other] : ws_.by_distance) {
-        if (meets(other->box(), bodies[k].box())) ws_.near.push_back(other);
+      for (const Workspace::Neighbour& other : ws_.by_gap) {
+        if (meets(other.body->box(), bodies[k].box())) ws_.near.push_back(other.body);
       }
       count_overlaps(bodies[k], ws_.near, params_.dish.radius_um, ws_.final_points, ws_.overlap, ws_.counts);
       fitness = std::min(fitness, ws_.counts.fitness());
@@ -128,6 +134,15 @@ class Scorer {
   }
 
  private:
+  // Puts into the voxels every neighbour that a body of this reach can meet.
+  void cover(float reach_um) {
+    // The margin is for rounding alone.
+    for (; covered_ < ws_.by_gap.size() && ws_.by_gap[covered_].gap_um <= 1.0001F * reach_um + 0.001F; ++covered_) {
+      const Workspace::Neighbour& other = ws_.by_gap[covered_];
+      ws_.voxels.add(ws_.rasters.of(other.id, *other.body, ws_.pair.field_count));
+    }
+  }
+
   bool neighbours_keep_enough(const std::array<Body, 2>& bodies) {
     const std::array<const Body*, 2> added = {&bodies[0], &bodies[1]};
     for (std::size_t j = 0; j < ws_.ids.size(); ++j) {
@@ -147,6 +162,7 @@ class Scorer {
   const SearchTask& task_;
   Workspace& ws_;
   bool racing_ = false;
+  std::size_t covered_ = 0;   // of by_gap: those in the voxels
 };
 
 class Search {

@@ -13,6 +13,7 @@
 #include "engine/random/sobol.hpp"
 #include "engine/space/overlap.hpp"
 #include "engine/space/pair_kernel.hpp"
+#include "engine/space/voxels.hpp"
 
 namespace colony {
 
@@ -52,10 +53,17 @@ struct Workspace {
   std::vector<const Body*> near;
   std::vector<Candidate> population, bred;
   kernel::SearchScene scene;
-  kernel::PairBuffers pair;
+  kernel::PairWork pair;
+  VoxelCounts voxels;
+  RasterCache rasters;
   std::array<kernel::CandidateBody, 2> candidate;
   std::vector<std::uint32_t> most_shared;
-  std::vector<std::pair<double, const Body*>> by_distance;
+  struct Neighbour {
+    float gap_um = 0.0F;                // no candidate of less reach can meet it
+    CellId id;
+    const Body* body = nullptr;
+  };
+  std::vector<Neighbour> by_gap;        // ascending
   PointSet points, final_points, retained_points;
   OverlapScratch overlap;
   OverlapCounts counts;

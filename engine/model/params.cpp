@@ -211,6 +211,18 @@ double body_half_extent_max_um(const Params& params) {
          std::sqrt(1.0 + noise_bound(params.noise));
 }
 
+double body_top_max_um(const Params& params) {
+  // C grows with the flatness (as its power 2/3), A and B fall with it: each is bounded on its own. A tilt about two axes lifts an end of A
+  // or B by at most its length times the sine of both tilts together; added, not in quadrature.
+  const double volume = params.cell.pair_volume_um3.high * (1.0 - params.cell.smaller_share.low);
+  const double flattest = largest_mean_semiaxis_um(params) * longest_ratio(params);
+  const double tallest = params.cell.flatness.high * maths::cbrt(3.0 * volume / (4.0 * maths::kPi * params.cell.flatness.high));
+  const double lift = maths::sincos(std::min(2.0 * params.search.tilt_max_deg * maths::kPi / 180.0, 0.5 * maths::kPi)).sin;
+  const double half = std::sqrt(1.0 + noise_bound(params.noise)) * (tallest + lift * flattest);
+  const double centre = (params.layers == Layers::kMono ? 0.55 : 2.55) * tallest;
+  return kRoundingMargin * (centre + half);
+}
+
 double search_reach_um(const Params& params) {
   // A candidate's centre lies at most distance * half-width along n and sideways * sqrt(AB) across it from the nucleus centre;
   // a half-width is at most the longest semiaxis. Added (not in quadrature): a bound, not an estimate.

@@ -154,6 +154,8 @@ std::vector<FieldError> validate(const Params& params, const std::vector<FieldEr
 Interval cycle_range_h(const Params& params);
 /// Largest distance of any point of a body's bounding box from its centre along x or y, over all parameters allowed, um.
 double body_half_extent_max_um(const Params& params);
+/// Highest point above the dish of any body's bounding box, over all parameters allowed, um.
+double body_top_max_um(const Params& params);
 /// Every body a division can place, noise box included, lies within this distance (per axis x, y) of the nucleus centre, um.
 double search_reach_um(const Params& params);
 

@@ -24,31 +24,6 @@ float pseudo_angle(float u, float v) {
 
 }  // namespace
 
-void NeighbourSet::clear() { bodies.clear(); }
-
-void NeighbourSet::add(const Body& body, const Vec3& origin_um) {
-  const std::size_t j = bodies.size();
-  bodies.emplace_back(body, origin_um);
-  for (std::size_t i = 0; i < 3; ++i) {
-    pad(centre[i], j + 1);
-    pad(half[i], j + 1);
-    centre[i][j] = static_cast<float>(body.centre_um()[static_cast<int>(i)] - origin_um[static_cast<int>(i)]);
-  }
-  Mat3 covariance = Mat3::Zero();
-  for (int i = 0; i < 3; ++i) {
-    // The rows of to_unit are the axes over the semiaxes.
-    const Vec3 axis = body.to_unit().row(i).transpose() * (body.semiaxes_um()[i] * body.semiaxes_um()[i] * body.noisy_scale());
-    covariance += axis * axis.transpose();
-  }
-  constexpr int kRows[6] = {0, 1, 2, 0, 0, 1};
-  constexpr int kColumns[6] = {0, 1, 2, 1, 2, 2};
-  for (std::size_t k = 0; k < 6; ++k) {
-    pad(form[k], j + 1);
-    form[k][j] = static_cast<float>(covariance(kRows[k], kColumns[k]));
-  }
-  for (std::size_t i = 0; i < 3; ++i) half[i][j] = std::sqrt(form[i][j]);
-}
-
 void select_own_points(const FloatBody& field, float noisy_scale, const PointSet& unit_points, OwnPoints& out) {
   const std::size_t n = unit_points.size();
   FloatBody unit = field;
@@ -112,9 +87,10 @@ PairScore score_pair_reference(const SearchScene& scene, const std::array<Candid
         ++score.sibling[k];
         ++score.shared[k];
       }
-      for (const FloatBody& other : scene.neighbours.bodies) {
-        if (is_inside_reference(other, x, y, z)) ++score.shared[k];
-      }
+      const auto cube = [&](float p, int axis) {
+        return static_cast<std::int32_t>((p - scene.voxel_corner[axis]) * scene.voxels_per_um);
+      };
+      score.shared[k] += scene.counts[(cube(z, 2) * scene.voxels_x + cube(y, 1)) * scene.voxels_x + cube(x, 0)];
     }
   }
   return score;

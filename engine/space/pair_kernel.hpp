@@ -1,19 +1,17 @@
 // pair_kernel: how much of a candidate pair's two bodies lies inside their neighbours: what the search for free space spends its time on.
 // Method:  points are given once a search in the unit frame of each body (u, v, w), where the body's own field, noise included, is
 //          the same for every candidate: only the points inside it are kept. A candidate maps them to the dish by its affine frame;
-//          those below the dish drop out; the rest are tested against the neighbours that can reach the body. The field of a
-//          neighbour is evaluated without the noise, and with it only where that decides the sign.
+//          those below the dish drop out; the rest ask the voxels how many neighbours cover them, and the sibling's field whether it does.
 //          Scoring goes through the points in stages and gives up once too many are shared (ShareLimit).
 // Units:   um relative to the search's origin, single precision.
 // Why the same bits everywhere: as overlap_kernel.hpp: + - * and compares in a fixed order per point; integers leave the kernel.
-// Threads: pure but for the caller's buffers.
-// Source:  the paper, 4.1 and 4.3; the common points of all candidates are ours (engine/DESIGN.md).
+// Threads: pure but for what they add to the caller's PairWork.
+// Source:  the paper, 4.1 and 4.3; the common points of all candidates and the voxels are ours (engine/DESIGN.md).
 #pragma once
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -22,8 +20,8 @@
 
 namespace colony::kernel {
 
-/// Points of the unit frame inside the noisy body, in the order of the Sobol points but sorted by direction inside each stage, so that
-/// the points of one vector lie close together and most vectors need no noise. Stage k ends before stage_ends[k].
+/// Points of the unit frame inside the noisy body. Each stage is a fair sample (a run of the Sobol sequence), sorted by direction so that
+/// the points of one vector lie close together. Stage k ends before stage_ends[k].
 struct OwnPoints {
   std::vector<float> u, v, w;           // padded by kPadding
   std::vector<std::uint32_t> stage_ends;
@@ -35,33 +33,26 @@ struct OwnPoints {
 /// Sizes of the stages but the last, which takes what is left. Multiples of 16, the most lanes of any target.
 inline constexpr std::array<std::uint32_t, 2> kStageSizes = {32, 32};
 
-/// A candidate body: p = axes (u, v, w) + centre. `form`: noise scale squared times axes axes^T as xx, yy, zz, xy, xz, yz.
+/// A candidate body: p = axes (u, v, w) + centre.
 struct CandidateBody {
   float axes[9];                        // row-major
   float centre[3];
-  float form[6];
+  float reach;                          // no point of it is further from the origin along x or y
   FloatBody field;                      // the same body as its sibling's neighbour
 };
 
-/// The bodies a search can meet, nearest to the origin first (padded arrays).
-struct NeighbourSet {
-  std::vector<FloatBody> bodies;
-  std::array<std::vector<float>, 3> centre;
-  std::array<std::vector<float>, 6> form;   // as CandidateBody::form
-  std::array<std::vector<float>, 3> half;   // half extents: roots of form's first three
-  std::size_t size() const { return bodies.size(); }
-  void clear();
-  void add(const Body& body, const Vec3& origin_um);
-};
-
-/// What is fixed during one search.
+/// What is fixed while a generation is scored.
 struct SearchScene {
   std::array<OwnPoints, 2> own;
-  NeighbourSet neighbours;
-  float dish_z = 0.0F;                       // the plane z = 0, relative to the origin
+  float dish_z = 0.0F;                       // the plane z = 0
   bool has_wall = false;
-  float wall_x = 0.0F, wall_y = 0.0F;        // the dish's centre, relative to the origin
+  float wall_x = 0.0F, wall_y = 0.0F;        // the dish's centre
   float wall_radius2 = 0.0F;
+  const std::uint8_t* counts = nullptr;      // of covering neighbours: VoxelCounts
+  std::int32_t voxels_x = 0;                 // cubes along x and along y
+  std::int32_t voxels_z = 0;
+  float voxel_corner[3] = {0.0F, 0.0F, 0.0F};
+  float voxels_per_um = 0.0F;
 };
 
 struct PairScore {
@@ -75,16 +66,14 @@ struct PairScore {
 /// most_shared[h]: a body with more than this many shared among its first h hits is given up. Empty: nobody is.
 using ShareLimit = std::span<const std::uint32_t>;
 
-struct PairBuffers {
-  std::vector<float> x, y, z;
-  std::array<std::vector<std::uint32_t>, 2> near;
-  std::uint64_t field_count = 0;             // evaluations of a neighbour's field
+struct PairWork {
+  std::uint64_t field_count = 0;             // evaluations of a field
   std::uint64_t noise_count = 0;             // of those, with noise
 };
 
-PairScore score_pair(const SearchScene& scene, const std::array<CandidateBody, 2>& pair, ShareLimit most_shared, PairBuffers& buffers);
+PairScore score_pair(const SearchScene& scene, const std::array<CandidateBody, 2>& pair, ShareLimit most_shared, PairWork& work);
 
-/// The brute-force twin: every point, every neighbour, noise always, nobody given up. The same counts to the last bit.
+/// The twin: every point on its own, the sibling's noise always, nobody given up. The same counts to the last bit.
 PairScore score_pair_reference(const SearchScene& scene, const std::array<CandidateBody, 2>& pair);
 
 /// Fills flags[0..n) with 1 where the point is inside `body`, else 0.

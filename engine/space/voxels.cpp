@@ -1,0 +1,153 @@
+#include "engine/space/voxels.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+
+#include "engine/base/check.hpp"
+#include "engine/base/maths.hpp"
+#include "engine/space/voxel_kernel.hpp"
+
+namespace colony {
+namespace {
+
+constexpr double kVoxelsMax = 8e6;         // in the box of a search
+constexpr double kEdgesAcrossSmallest = 8.0;
+
+std::int32_t cube_of(double coordinate_um, double edge_um) {
+  const double quotient = coordinate_um / edge_um;
+  CHECK(quotient > -2e9 && quotient < 2e9);
+  const auto truncated = static_cast<std::int64_t>(quotient);
+  return static_cast<std::int32_t>(truncated - (static_cast<double>(truncated) > quotient ? 1 : 0));
+}
+
+// Where the raster lies, and the body relative to the centre of its first cube.
+kernel::FloatBody frame_raster(const Body& body, double edge_um, Raster& out) {
+  const Box& box = body.box();
+  out.x0 = cube_of(box.low.x(), edge_um);
+  out.y0 = cube_of(box.low.y(), edge_um);
+  out.z0 = cube_of(box.low.z(), edge_um);
+  out.nx = cube_of(box.high.x(), edge_um) - out.x0 + 1;
+  out.ny = cube_of(box.high.y(), edge_um) - out.y0 + 1;
+  out.nz = cube_of(box.high.z(), edge_um) - out.z0 + 1;
+  out.words_per_row = (out.nx + 31) / 32;
+  out.rows.assign(static_cast<std::size_t>(out.words_per_row) * static_cast<std::size_t>(out.ny) * static_cast<std::size_t>(out.nz), 0);
+  return kernel::FloatBody(body, Vec3((out.x0 + 0.5) * edge_um, (out.y0 + 0.5) * edge_um, (out.z0 + 0.5) * edge_um));
+}
+
+// Byte i of the entry is 1 where bit i of the index is set.
+constexpr std::array<std::uint64_t, 256> kBytesOfBits = [] {
+  std::array<std::uint64_t, 256> table{};
+  for (std::size_t bits = 0; bits < 256; ++bits) {
+    for (std::size_t i = 0; i < 8; ++i) {
+      if ((bits >> i) & 1U) table[bits] |= std::uint64_t{1} << (8 * i);
+    }
+  }
+  return table;
+}();
+static_assert(std::endian::native == std::endian::little);
+
+}  // namespace
+
+bool Raster::holds(std::int32_t x, std::int32_t y, std::int32_t z) const {
+  const std::int32_t i = x - x0, j = y - y0, k = z - z0;
+  if (i < 0 || j < 0 || k < 0 || i >= nx || j >= ny || k >= nz) return false;
+  return (rows[static_cast<std::size_t>((k * ny + j) * words_per_row + i / 32)] >> (i % 32)) & 1U;
+}
+
+void make_raster(const Body& body, double edge_um, Raster& out) {
+  const kernel::FloatBody relative = frame_raster(body, edge_um, out);
+  kernel::raster_rows(relative, static_cast<float>(edge_um), out.nx, out.ny, out.nz, out.words_per_row, out.rows.data());
+}
+
+void make_raster_reference(const Body& body, double edge_um, Raster& out) {
+  const kernel::FloatBody relative = frame_raster(body, edge_um, out);
+  const auto edge = static_cast<float>(edge_um);
+  for (std::int32_t k = 0; k < out.nz; ++k) {
+    for (std::int32_t j = 0; j < out.ny; ++j) {
+      for (std::int32_t i = 0; i < out.nx; ++i) {
+        if (!kernel::is_inside_reference(relative, edge * static_cast<float>(i), edge * static_cast<float>(j), edge * static_cast<float>(k))) continue;
+        out.rows[static_cast<std::size_t>((k * out.ny + j) * out.words_per_row + i / 32)] |= 1U << (i % 32);
+      }
+    }
+  }
+}
+
+const Raster& RasterCache::of(CellId id, const Body& body, std::uint64_t& field_count) {
+  while (slots_.size() < kSlotsMax && slots_.size() < id.value) {
+    std::vector<Slot> grown(std::max<std::size_t>(64, 2 * slots_.size()));
+    for (Slot& slot : slots_) {
+      if (slot.id.value != 0) std::swap(grown[slot.id.value % grown.size()], slot);
+    }
+    slots_ = std::move(grown);
+  }
+  Slot& slot = slots_[id.value % slots_.size()];
+  const bool known = slot.id == id && slot.centre == body.centre_um() && slot.to_unit == body.to_unit() && slot.noise_offset == body.noise_offset();
+  if (!known) {
+    slot.id = id;
+    slot.centre = body.centre_um();
+    slot.to_unit = body.to_unit();
+    slot.noise_offset = body.noise_offset();
+    make_raster(body, edge_um_, slot.raster);
+    field_count += static_cast<std::uint64_t>(slot.raster.nx) * static_cast<std::uint64_t>(slot.raster.ny) * static_cast<std::uint64_t>(slot.raster.nz);
+  }
+  return slot.raster;
+}
+
+double voxel_edge_um(const Params& params) {
+  const double smallest_um3 = params.cell.pair_volume_um3.low * params.cell.smaller_share.low;
+  const double wanted = maths::cbrt(smallest_um3) / kEdgesAcrossSmallest;
+  const double width = 2.0 * search_reach_um(params);
+  return std::max(wanted, maths::cbrt(width * width * body_top_max_um(params) / kVoxelsMax));
+}
+
+VoxelCounts::VoxelCounts(const Params& params) : edge_um_(voxel_edge_um(params)) {
+  n_ = static_cast<std::int32_t>(2.0 * search_reach_um(params) / edge_um_) + 4;
+  nz_ = static_cast<std::int32_t>(body_top_max_um(params) / edge_um_) + 2;
+  counts_.resize(static_cast<std::size_t>(n_) * static_cast<std::size_t>(n_) * static_cast<std::size_t>(nz_) + 16);
+}
+
+void VoxelCounts::centre_on(const Vec3& pivot_um) {
+  x0_ = cube_of(pivot_um.x(), edge_um_) - n_ / 2;
+  y0_ = cube_of(pivot_um.y(), edge_um_) - n_ / 2;
+  added_ = 0;
+  std::memset(counts_.data(), 0, counts_.size());
+}
+
+void VoxelCounts::add(const Raster& raster) {
+  ++added_;
+  const std::int32_t first_x = raster.x0 - x0_;
+  const std::int32_t first_y = raster.y0 - y0_;
+  CHECK(raster.z0 >= 0 && raster.z0 + raster.nz < nz_);
+  // Whole words fit, and no count can overflow: eight cubes at a time.
+  const bool whole = first_x >= 0 && first_x + 32 * raster.words_per_row <= n_ && added_ < 255;
+  for (std::int32_t k = 0; k < raster.nz; ++k) {
+    for (std::int32_t j = std::max(0, -first_y); j < raster.ny && first_y + j < n_; ++j) {
+      const std::uint32_t* words = raster.rows.data() + (k * raster.ny + j) * raster.words_per_row;
+      std::uint8_t* row = counts_.data() + ((raster.z0 + k) * n_ + first_y + j) * n_;
+      for (std::int32_t word = 0; word < raster.words_per_row; ++word) {
+        std::uint32_t bits = words[word];
+        if (bits == 0) continue;
+        const std::int32_t x = first_x + 32 * word;
+        if (whole) {
+          for (int byte = 0; byte < 4; ++byte) {
+            std::uint64_t counts = 0;
+            std::uint8_t* at = row + x + 8 * byte;
+            std::memcpy(&counts, at, 8);
+            counts += kBytesOfBits[(bits >> (8 * byte)) & 255U];
+            std::memcpy(at, &counts, 8);
+          }
+          continue;
+        }
+        for (; bits != 0; bits &= bits - 1) {
+          const std::int32_t at = x + std::countr_zero(bits);
+          if (at < 0 || at >= n_) continue;
+          if (row[at] < 255) ++row[at];
+        }
+      }
+    }
+  }
+}
+
+}  // namespace colony
