@@ -60,22 +60,19 @@ BitFlips::BitFlips(int length, double rate) : length_(length) {
     survival *= 1.0 - rate;
     survival_.push_back(static_cast<std::uint32_t>(survival * 4294967295.0));
   }
+  survival_.push_back(0);
+  for (std::uint32_t byte = 0; byte < 256; ++byte) {
+    const std::uint32_t largest = (byte << 24) | 0xffffffU;
+    while (largest < survival_[guide_[byte]]) ++guide_[byte];
+  }
 }
 
 int BitFlips::gap(Stream& stream) const {
+  // The number of k with u < survival_[k].
   const std::uint32_t u = stream.next_u32();
-  // The number of k with u < survival_[k], which fall with k.
-  std::size_t low = 0;
-  std::size_t high = survival_.size();
-  while (low < high) {
-    const std::size_t middle = (low + high) / 2;
-    if (u < survival_[middle]) {
-      low = middle + 1;
-    } else {
-      high = middle;
-    }
-  }
-  return static_cast<int>(low);
+  std::uint32_t k = guide_[u >> 24];
+  while (u < survival_[k]) ++k;
+  return static_cast<int>(k);
 }
 
 std::uint32_t code_of(double value, int bits, Coding coding) {

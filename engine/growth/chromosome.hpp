@@ -71,7 +71,8 @@ class BitFlips {
   int gap(Stream& stream) const;
 
   int length_ = 0;
-  std::vector<std::uint32_t> survival_;   // [k]: 2^32 P(gap > k), rounded down; P(gap > length - 1) and beyond is the end
+  std::vector<std::uint32_t> survival_;   // [k]: 2^32 P(gap > k), rounded down; falling; then a 0
+  std::array<std::uint32_t, 256> guide_{};  // by the highest byte of a draw: a k from which to go on
 };
 
 /// The code of the value nearest to `value` in [0, 1].

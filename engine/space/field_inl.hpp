@@ -24,19 +24,15 @@ HWY_INLINE V constant(float value) { return hn::Set(D(), value); }
 HWY_INLINE V sine(V x) {
   const D d;
   const hn::RebindToSigned<D> integers;
-  const V turns = hn::Mul(x, constant(0.318309886F));
-  // |turns| <= 100 / pi: the conversion is in range.
-  const auto k = hn::ConvertTo(integers, hn::Add(turns, hn::CopySign(constant(0.5F), turns)));
-  const V kf = hn::ConvertTo(d, k);
-  const V r = hn::Sub(hn::Sub(x, hn::Mul(kf, constant(3.140625F))), hn::Mul(kf, constant(9.67653589793e-4F)));
+  // Adding 1.5 * 2^23 rounds to the nearest integer, whose lowest bit is then the sum's.
+  const V shifted = hn::Add(hn::Mul(x, constant(0.318309886F)), constant(12582912.0F));
+  const V k = hn::Sub(shifted, constant(12582912.0F));
+  const V r = hn::Sub(x, hn::Mul(k, constant(3.14159265F)));
   const V r2 = hn::Mul(r, r);
-  V sum = constant(-2.50521084e-8F);
-  sum = hn::Add(hn::Mul(sum, r2), constant(2.75573192e-6F));
-  sum = hn::Sub(hn::Mul(sum, r2), constant(1.98412698e-4F));
-  sum = hn::Add(hn::Mul(sum, r2), constant(8.33333333e-3F));
-  sum = hn::Sub(hn::Mul(sum, r2), constant(1.66666667e-1F));
+  V sum = hn::Add(hn::Mul(constant(-1.84901083e-4F), r2), constant(8.31230105e-3F));
+  sum = hn::Sub(hn::Mul(sum, r2), constant(1.66656764e-1F));
   const V s = hn::Add(r, hn::Mul(hn::Mul(r, r2), sum));
-  return hn::Xor(s, hn::BitCast(d, hn::ShiftLeft<31>(k)));  // odd k: the sign bit
+  return hn::Xor(s, hn::BitCast(d, hn::ShiftLeft<31>(hn::BitCast(integers, shifted))));  // odd k: the sign bit
 }
 
 HWY_INLINE V noise(const FloatBody& b, V u, V v, V w) {

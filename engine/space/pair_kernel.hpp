@@ -49,10 +49,9 @@ struct SearchScene {
   float wall_x = 0.0F, wall_y = 0.0F;        // the dish's centre
   float wall_radius2 = 0.0F;
   const std::uint8_t* counts = nullptr;      // of covering neighbours: VoxelCounts
-  std::int32_t voxels_x = 0;                 // cubes along x and along y
-  std::int32_t voxels_z = 0;
-  float voxel_corner[3] = {0.0F, 0.0F, 0.0F};
+  float voxels_x = 0.0F;                     // cubes along x and along y; a whole number
   float voxels_per_um = 0.0F;
+  float voxel_shift[3] = {0.0F, 0.0F, 0.0F}; // p voxels_per_um + voxel_shift, rounded to nearest, is the cube of p
 };
 
 struct PairScore {

@@ -16,21 +16,26 @@ struct Tally {
   std::uint32_t hits = 0, covering = 0, sibling = 0;
 };
 
-// Counts of the covering neighbours at the cubes `index`, summed over the lanes of `above`.
-template <class VI, class M>
-HWY_INLINE std::uint32_t look_up(const std::uint8_t* counts, VI index, M above) {
+// Lane by lane the counts at the cubes with the indices `cubes` (whole numbers below 2^23), 0 where not `above`.
+template <class M>
+HWY_INLINE hn::Vec<hn::RebindToSigned<D>> look_up(const std::uint8_t* counts, V cubes, M above) {
+  const D d;
   const hn::RebindToSigned<D> integers;
+  const auto index = hn::ConvertTo(integers, hn::IfThenElseZero(above, cubes));
 #if HWY_TARGET <= HWY_AVX2
-  const VI words = hn::GatherOffset(integers, reinterpret_cast<const std::int32_t*>(counts), hn::IfThenElseZero(hn::RebindMask(integers, above), index));
-  const VI bytes = hn::IfThenElseZero(hn::RebindMask(integers, above), hn::And(words, hn::Set(integers, 255)));
-  return static_cast<std::uint32_t>(hn::GetLane(hn::SumOfLanes(integers, bytes)));
+  const auto words = hn::GatherOffset(integers, reinterpret_cast<const std::int32_t*>(counts), index);
+  return hn::IfThenElseZero(hn::RebindMask(integers, above), hn::And(words, hn::Set(integers, 255)));
 #else
   HWY_ALIGN std::int32_t at[HWY_MAX_BYTES / sizeof(std::int32_t)];
-  hn::Store(hn::IfThenElse(hn::RebindMask(integers, above), index, hn::Set(integers, -1)), integers, at);
-  std::uint32_t sum = 0;
-  for (std::size_t lane = 0; lane < hn::Lanes(integers); ++lane) sum += at[lane] < 0 ? 0U : counts[at[lane]];
-  return sum;
+  hn::Store(index, integers, at);
+  for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane) at[lane] = counts[at[lane]];
+  return hn::IfThenElseZero(hn::RebindMask(integers, above), hn::Load(integers, at));
 #endif
+}
+
+// The whole number of the cube at `value` >= 0 (in edges): value - 1/2 rounded to nearest, which is the floor but at the faces.
+HWY_INLINE V cube_of(V value_less_half) {
+  return hn::Sub(hn::Add(value_less_half, constant(12582912.0F)), constant(12582912.0F));
 }
 
 // The own points first..last of one body.
@@ -39,8 +44,13 @@ HWY_INLINE Tally tally(const SearchScene& scene, const CandidateBody& body, cons
   const D d;
   const hn::RebindToSigned<D> integers;
   const std::size_t lanes = hn::Lanes(d);
-  Tally sum;
+  std::size_t hits = 0;
+  std::size_t in_sibling = 0;
+  std::size_t noisy = 0;
+  auto covering = hn::Zero(integers);
   const float* a = body.axes;
+  const V scale = constant(scene.voxels_per_um);
+  const V nx = constant(scene.voxels_x);
   for (std::size_t i = first; i < last; i += lanes) {
     const V u = hn::LoadU(d, own.u.data() + i);
     const V v = hn::LoadU(d, own.v.data() + i);
@@ -49,22 +59,19 @@ HWY_INLINE Tally tally(const SearchScene& scene, const CandidateBody& body, cons
     const V y = row(a + 3, body.centre[1], u, v, w);
     const V z = row(a + 6, body.centre[2], u, v, w);
     const auto above = hn::And(hn::Ge(z, constant(scene.dish_z)), hn::FirstN(d, last - i));
-    if (hn::AllFalse(d, above)) continue;
-    sum.hits += static_cast<std::uint32_t>(hn::CountTrue(d, above));
+    hits += hn::CountTrue(d, above);
     if (scene.has_wall) {
       const V wx = hn::Sub(x, constant(scene.wall_x));
       const V wy = hn::Sub(y, constant(scene.wall_y));
       const auto beyond = hn::Gt(hn::Add(hn::Mul(wx, wx), hn::Mul(wy, wy)), constant(scene.wall_radius2));
       if (!hn::AllFalse(d, hn::And(beyond, above))) beyond_wall = true;
     }
-    // The cube of each point: never negative for lanes above the dish, since the box of cubes holds every candidate.
-    const V scale = constant(scene.voxels_per_um);
-    const auto ix = hn::ConvertTo(integers, hn::Mul(hn::Sub(x, constant(scene.voxel_corner[0])), scale));
-    const auto iy = hn::ConvertTo(integers, hn::Mul(hn::Sub(y, constant(scene.voxel_corner[1])), scale));
-    const auto iz = hn::ConvertTo(integers, hn::Mul(hn::Sub(z, constant(scene.voxel_corner[2])), scale));
-    const auto nx = hn::Set(integers, scene.voxels_x);
-    const auto index = hn::Add(hn::Mul(hn::Add(hn::Mul(iz, nx), iy), nx), ix);
-    sum.covering += look_up(scene.counts, index, above);
+    const V cube_x = cube_of(hn::Add(hn::Mul(x, scale), constant(scene.voxel_shift[0])));
+    const V cube_y = cube_of(hn::Add(hn::Mul(y, scale), constant(scene.voxel_shift[1])));
+    const V cube_z = cube_of(hn::Add(hn::Mul(z, scale), constant(scene.voxel_shift[2])));
+    // Exact: all whole numbers below 2^23.
+    const V cube = hn::Add(hn::Mul(hn::Add(hn::Mul(cube_z, nx), cube_y), nx), cube_x);
+    covering = hn::Add(covering, look_up(scene.counts, cube, above));
 
     const V su = row(sibling.m, sibling.t[0], x, y, z);
     const V sv = row(sibling.m + 3, sibling.t[1], x, y, z);
@@ -75,15 +82,17 @@ HWY_INLINE Tally tally(const SearchScene& scene, const CandidateBody& body, cons
     const auto inside = hn::And(near, hn::Gt(smooth, constant(sibling.band)));
     const auto undecided = hn::AndNot(inside, near);
     if (hn::AllFalse(d, undecided)) {
-      sum.sibling += static_cast<std::uint32_t>(hn::CountTrue(d, inside));
+      in_sibling += hn::CountTrue(d, inside);
       continue;
     }
-    work.noise_count += hn::CountTrue(d, undecided);
+    noisy += hn::CountTrue(d, undecided);
     const V field = hn::Add(smooth, noise(sibling, su, sv, sw));
-    sum.sibling += static_cast<std::uint32_t>(hn::CountTrue(d, hn::Or(inside, hn::And(undecided, hn::Ge(field, hn::Zero(d))))));
+    in_sibling += hn::CountTrue(d, hn::Or(inside, hn::And(undecided, hn::Ge(field, hn::Zero(d)))));
   }
-  work.field_count += sum.hits;
-  return sum;
+  work.field_count += hits;
+  work.noise_count += noisy;
+  const auto covered = static_cast<std::uint32_t>(hn::GetLane(hn::SumOfLanes(integers, covering)));
+  return {static_cast<std::uint32_t>(hits), covered, static_cast<std::uint32_t>(in_sibling)};
 }
 
 PairScore score_pair_kernel(const SearchScene& scene, const std::array<CandidateBody, 2>& pair, ShareLimit most_shared,
