@@ -1,5 +1,6 @@
 #include "engine/growth/chromosome.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "engine/base/check.hpp"
@@ -84,12 +85,12 @@ std::uint32_t code_of(double value, int bits, Coding coding) {
 Chromosome crossover(const Chromosome& a, const Chromosome& b, int cut) {
   CHECK(a.bits() == b.bits() && cut >= 0 && cut <= a.length());
   Chromosome child = b;
-  const int whole = cut / a.bits();
-  for (int gene = 0; gene < whole; ++gene) child.set_code(gene, a.code(gene));
+  const auto whole = static_cast<std::size_t>(cut / a.bits());
+  std::copy(a.codes_.begin(), a.codes_.begin() + static_cast<std::ptrdiff_t>(whole), child.codes_.begin());
   const int head = cut % a.bits();
   if (head > 0) {
     const std::uint32_t low = (1U << (a.bits() - head)) - 1U;
-    child.set_code(whole, (a.code(whole) & ~low) | (b.code(whole) & low));
+    child.codes_[whole] = static_cast<std::uint16_t>((a.codes_[whole] & ~low) | (b.codes_[whole] & low));
   }
   return child;
 }

@@ -43,6 +43,7 @@ class Chromosome {
   double value(int gene, Coding coding) const;
   friend bool operator==(const Chromosome&, const Chromosome&) = default;
   friend auto operator<=>(const Chromosome&, const Chromosome&) = default;
+  friend Chromosome crossover(const Chromosome& a, const Chromosome& b, int cut);
 
  private:
   int gene_count_ = kGeneCountMono;

@@ -49,6 +49,7 @@ class Scorer {
     ws_.voxels.centre_on(c);
     scene.counts = ws_.voxels.counts();
     scene.voxels_x = static_cast<float>(ws_.voxels.nx());
+    scene.empty_cube = static_cast<float>(ws_.voxels.empty_cube());
     scene.voxels_per_um = static_cast<float>(1.0 / ws_.voxels.edge_um());
     const Vec3 shift = (c - ws_.voxels.corner_um()) / ws_.voxels.edge_um() - Vec3::Constant(0.5);
     for (int i = 0; i < 3; ++i) scene.voxel_shift[i] = static_cast<float>(shift[i]);
@@ -222,16 +223,16 @@ class Search {
       Stream random = stream(static_cast<std::uint32_t>(generation));
       next.clear();
       next.push_back(best_);  // the best is kept, and not scored again
-      while (next.size() < population_size_) next.push_back(breed(population, random));
+      while (next.size() < population_size_) breed(population, random, next.emplace_back());
       evaluate(next, 1);
       std::swap(population, next);
     }
   }
 
-  Candidate breed(const std::vector<Candidate>& population, Stream& random) const {
+  void breed(const std::vector<Candidate>& population, Stream& random, Candidate& child) const {
     const Candidate& a = select(population, random);
     const Candidate& b = select(population, random);
-    Candidate child = a;
+    child = a;
     if (random.uniform() < params_.search.crossover_rate) {
       const int cut = 1 + static_cast<int>(random.below(static_cast<std::uint32_t>(child.chromosome.length() - 1)));
       child.chromosome = crossover(a.chromosome, b.chromosome, cut);
@@ -243,7 +244,6 @@ class Search {
     } else if (child.chromosome != a.chromosome) {
       child.fitness = kUnscored;
     }
-    return child;
   }
 
   const Candidate& select(const std::vector<Candidate>& population, Stream& random) const {

@@ -91,7 +91,11 @@ const Reversed& reversed_points() {
     for (int d = 0; d < 3; ++d) {
       auto& column = made[static_cast<std::size_t>(d)];
       column.resize(kPointsMax + kScramblePadding);
-      for (std::uint32_t i = 0; i < kPointsMax; ++i) column[i] = reverse_bits(sobol_u32(i, d));
+      // Point i is point i without its lowest bit, and that bit's direction.
+      for (std::uint32_t i = 1; i < kPointsMax; ++i) {
+        const auto bit = static_cast<std::size_t>(std::countr_zero(i));
+        column[i] = column[i & (i - 1)] ^ reverse_bits(kColumns[static_cast<std::size_t>(d)][bit]);
+      }
     }
     return made;
   }();

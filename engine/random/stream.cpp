@@ -1,5 +1,6 @@
 #include "engine/random/stream.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include <Random123/philox.h>
@@ -24,33 +25,26 @@ Stream::Stream(Seed seed, CellId cell, std::uint32_t ordinal, Purpose purpose, s
   CHECK(lane < (1U << 24));
 }
 
-std::uint32_t Stream::next_u32() {
-  if (used_ == 4) {
-    block_ = philox4x32_10(counter_, key_);
+void Stream::refill() {
+  // Most streams give a few words; from the second block on four are made at once, which keeps the multipliers busy.
+  const int blocks = held_ == 0 ? 1 : 4;
+  for (int k = 0; k < blocks; ++k) {
+    const std::array<std::uint32_t, 4> block = philox4x32_10(counter_, key_);
+    std::copy(block.begin(), block.end(), words_.begin() + 4 * k);
     ++counter_[3];
     CHECK(counter_[3] != 0);
-    used_ = 0;
   }
-  return block_[static_cast<std::size_t>(used_++)];
+  used_ = 0;
+  held_ = 4 * blocks;
 }
-
-std::uint64_t Stream::next_u64() {
-  const std::uint64_t low = next_u32();
-  return low | (static_cast<std::uint64_t>(next_u32()) << 32);
-}
-
-double Stream::uniform() { return static_cast<double>(next_u64() >> 11) * 0x1.0p-53; }
 
 double Stream::uniform(const Interval& interval) { return interval.low + (interval.high - interval.low) * uniform(); }
 
-std::uint32_t Stream::below(std::uint32_t n) {
+std::uint64_t Stream::below_rarely(std::uint32_t n, std::uint64_t product) {
   CHECK(n >= 1);
-  // Lemire's multiply-and-reject: values of `low` under (2^32 mod n) would make some results likelier than others.
   const std::uint32_t threshold = (0U - n) % n;
-  for (;;) {
-    const std::uint64_t product = static_cast<std::uint64_t>(next_u32()) * n;
-    if (static_cast<std::uint32_t>(product) >= threshold) return static_cast<std::uint32_t>(product >> 32);
-  }
+  while (static_cast<std::uint32_t>(product) < threshold) product = static_cast<std::uint64_t>(next_u32()) * n;
+  return product;
 }
 
 double Stream::normal() {

@@ -33,22 +33,38 @@ class Stream {
  public:
   Stream(Seed seed, CellId cell, std::uint32_t ordinal, Purpose purpose, std::uint32_t lane = 0);
 
-  std::uint32_t next_u32();
-  std::uint64_t next_u64();
+  std::uint32_t next_u32() {
+    if (used_ == held_) refill();
+    return words_[static_cast<std::size_t>(used_++)];
+  }
+  std::uint64_t next_u64() {
+    const std::uint64_t low = next_u32();
+    return low | (static_cast<std::uint64_t>(next_u32()) << 32);
+  }
   /// Uniform in [0, 1), 53 bits.
-  double uniform();
+  double uniform() { return static_cast<double>(next_u64() >> 11) * 0x1.0p-53; }
   /// Uniform in [low, high) (low if they are equal).
   double uniform(const Interval& interval);
   /// Uniform in 0..n-1 without bias; n >= 1.
-  std::uint32_t below(std::uint32_t n);
+  std::uint32_t below(std::uint32_t n) {
+    // Lemire's multiply-and-reject: values of the low half under (2^32 mod n) would make some results likelier than others. It is below n,
+    // so the division is needed only when the low half is too.
+    std::uint64_t product = static_cast<std::uint64_t>(next_u32()) * n;
+    if (static_cast<std::uint32_t>(product) < n) product = below_rarely(n, product);
+    return static_cast<std::uint32_t>(product >> 32);
+  }
   /// Standard normal (Box-Muller, one value a call).
   double normal();
 
  private:
+  void refill();
+  std::uint64_t below_rarely(std::uint32_t n, std::uint64_t product);
+
   std::array<std::uint32_t, 2> key_;
   std::array<std::uint32_t, 4> counter_;
-  std::array<std::uint32_t, 4> block_{};
-  int used_ = 4;  // words of block_ given out
+  std::array<std::uint32_t, 16> words_;   // not initialised: refill() comes first
+  int used_ = 0;                          // words given out
+  int held_ = 0;                          // words there
 };
 
 /// The raw function, for known-answer tests.

@@ -50,6 +50,7 @@ struct SearchScene {
   float wall_radius2 = 0.0F;
   const std::uint8_t* counts = nullptr;      // of covering neighbours: VoxelCounts
   float voxels_x = 0.0F;                     // cubes along x and along y; a whole number
+  float empty_cube = 0.0F;                   // index of a count that is always 0
   float voxels_per_um = 0.0F;
   float voxel_shift[3] = {0.0F, 0.0F, 0.0F}; // p voxels_per_um + voxel_shift, rounded to nearest, is the cube of p
 };

@@ -16,21 +16,16 @@ struct Tally {
   std::uint32_t hits = 0, covering = 0, sibling = 0;
 };
 
-// Lane by lane the counts at the cubes with the indices `cubes` (whole numbers below 2^23), 0 where not `above`.
-template <class M>
-HWY_INLINE hn::Vec<hn::RebindToSigned<D>> look_up(const std::uint8_t* counts, V cubes, M above) {
+// Counts at the cubes with these indices (whole numbers below 2^23), summed over the lanes. One load a lane: a gather costs more on the
+// CPUs we know (Zen).
+HWY_INLINE std::uint32_t look_up(const std::uint8_t* counts, V cubes) {
   const D d;
   const hn::RebindToSigned<D> integers;
-  const auto index = hn::ConvertTo(integers, hn::IfThenElseZero(above, cubes));
-#if HWY_TARGET <= HWY_AVX2
-  const auto words = hn::GatherOffset(integers, reinterpret_cast<const std::int32_t*>(counts), index);
-  return hn::IfThenElseZero(hn::RebindMask(integers, above), hn::And(words, hn::Set(integers, 255)));
-#else
   HWY_ALIGN std::int32_t at[HWY_MAX_BYTES / sizeof(std::int32_t)];
-  hn::Store(index, integers, at);
-  for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane) at[lane] = counts[at[lane]];
-  return hn::IfThenElseZero(hn::RebindMask(integers, above), hn::Load(integers, at));
-#endif
+  hn::Store(hn::ConvertTo(integers, cubes), integers, at);
+  std::uint32_t sum = 0;
+  for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane) sum += counts[at[lane]];
+  return sum;
 }
 
 // The whole number of the cube at `value` >= 0 (in edges): value - 1/2 rounded to nearest, which is the floor but at the faces.
@@ -42,12 +37,11 @@ HWY_INLINE V cube_of(V value_less_half) {
 HWY_INLINE Tally tally(const SearchScene& scene, const CandidateBody& body, const FloatBody& sibling, const OwnPoints& own,
                        std::uint32_t first, std::uint32_t last, PairWork& work, bool& beyond_wall) {
   const D d;
-  const hn::RebindToSigned<D> integers;
   const std::size_t lanes = hn::Lanes(d);
   std::size_t hits = 0;
   std::size_t in_sibling = 0;
   std::size_t noisy = 0;
-  auto covering = hn::Zero(integers);
+  std::uint32_t covering = 0;
   const float* a = body.axes;
   const V scale = constant(scene.voxels_per_um);
   const V nx = constant(scene.voxels_x);
@@ -71,7 +65,7 @@ HWY_INLINE Tally tally(const SearchScene& scene, const CandidateBody& body, cons
     const V cube_z = cube_of(hn::Add(hn::Mul(z, scale), constant(scene.voxel_shift[2])));
     // Exact: all whole numbers below 2^23.
     const V cube = hn::Add(hn::Mul(hn::Add(hn::Mul(cube_z, nx), cube_y), nx), cube_x);
-    covering = hn::Add(covering, look_up(scene.counts, cube, above));
+    covering += look_up(scene.counts, hn::IfThenElse(above, cube, constant(scene.empty_cube)));
 
     const V su = row(sibling.m, sibling.t[0], x, y, z);
     const V sv = row(sibling.m + 3, sibling.t[1], x, y, z);
@@ -91,8 +85,7 @@ HWY_INLINE Tally tally(const SearchScene& scene, const CandidateBody& body, cons
   }
   work.field_count += hits;
   work.noise_count += noisy;
-  const auto covered = static_cast<std::uint32_t>(hn::GetLane(hn::SumOfLanes(integers, covering)));
-  return {static_cast<std::uint32_t>(hits), covered, static_cast<std::uint32_t>(in_sibling)};
+  return {static_cast<std::uint32_t>(hits), covering, static_cast<std::uint32_t>(in_sibling)};
 }
 
 PairScore score_pair_kernel(const SearchScene& scene, const std::array<CandidateBody, 2>& pair, ShareLimit most_shared,

@@ -68,7 +68,9 @@ class VoxelCounts {
   std::int32_t nz() const { return nz_; }
   /// Coordinate (um, absolute) of the low corner of the box.
   Vec3 corner_um() const { return {x0_ * edge_um_, y0_ * edge_um_, 0.0}; }
-  /// counts()[(z * nx() + y) * nx() + x]; readable 16 beyond the end. 255 stands for 255 and more.
+  /// Index of a count that stays 0.
+  std::size_t empty_cube() const { return counts_.size() - 1; }
+  /// counts()[(z * nx() + y) * nx() + x]. 255 stands for 255 and more.
   const std::uint8_t* counts() const { return counts_.data(); }
 
  private:
