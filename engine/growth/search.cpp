@@ -20,6 +20,8 @@ std::array<std::uint32_t, 3> seeds_for(const SearchTask& task, Purpose purpose, 
   return {stream.next_u32(), stream.next_u32(), stream.next_u32()};
 }
 
+constexpr double kGiveUpMarginLast = 0.02;
+
 double share_left(std::uint32_t hits, std::uint32_t shared) {
   return shared >= hits ? 0.0 : static_cast<double>(hits - shared) / static_cast<double>(hits);
 }
@@ -175,7 +177,7 @@ class Search {
   SearchResult run() {
     if (params_.search.optimiser == Optimiser::kGenetic) {
       predict();
-      if (best_.fitness < params_.contact.fitness_good && params_.search.corrector_generations > 0) correct();
+      if (!good() && !hopeless_ && params_.search.corrector_generations > 0) correct();
     } else {
       sample();
     }
@@ -219,14 +221,27 @@ class Search {
     for (std::size_t i = 0; i < population_size_; ++i) population.push_back({random_chromosome(gene_count_, bits(), first), kUnscored});
     population[0].chromosome.set_code(kTurn, code_of(0.5, bits(), params_.search.coding));  // the unturned plane
     evaluate(population, 0);
-    for (std::int64_t generation = 1; generation <= params_.search.generations && !good(); ++generation) {
+    hopeless_ = is_hopeless(0);
+    for (std::int64_t generation = 1; generation <= params_.search.generations && !good() && !hopeless_; ++generation) {
       Stream random = stream(static_cast<std::uint32_t>(generation));
       next.clear();
       next.push_back(best_);  // the best is kept, and not scored again
       while (next.size() < population_size_) breed(population, random, next.emplace_back());
       evaluate(next, 1);
       std::swap(population, next);
+      hopeless_ = is_hopeless(generation);
     }
+  }
+
+  // Whether so low a best after this generation has practically never led to a division. The margin that a search may still win shrinks
+  // linearly with the generations left, from give_up_margin to kGiveUpMarginLast at the end of the predictor (the corrector, and what a
+  // winner loses on fresh points). Measured: engine/DESIGN.md. Without inhibition any best is accepted, so the search goes on.
+  bool is_hopeless(std::int64_t generation) const {
+    if (!params_.search.give_up_margin || !params_.division.inhibition) return false;
+    const auto left = static_cast<double>(params_.search.generations - generation);
+    const double range = std::max(*params_.search.give_up_margin - kGiveUpMarginLast, 0.0);
+    const double share = left > 0.0 ? left / static_cast<double>(params_.search.generations) : 0.0;
+    return best_.fitness < params_.contact.fitness_min - kGiveUpMarginLast - range * share;
   }
 
   void breed(const std::vector<Candidate>& population, Stream& random, Candidate& child) const {
@@ -333,6 +348,7 @@ class Search {
   Candidate best_;
   std::uint32_t evaluation_count_ = 0;
   bool corrected_ = false;
+  bool hopeless_ = false;
 };
 
 }  // namespace
