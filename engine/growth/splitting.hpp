@@ -1,6 +1,6 @@
 // splitting: the plane in which a cell divides, and how its nucleus comes to rest.
 // Method:  the plane holds the nucleus centre c, the nearest membrane point m and the substrate normal; its normal is the
-//          principal splitting direction. m is the nearest of kMembranePoints Sobol points of the slab |z - c_z| <= 0.3 C, z >= 0,
+//          principal splitting direction. m is the nearest of kSettlePoints Sobol points of the slab |z - c_z| <= 0.3 C, z >= 0,
 //          that lie outside the deformed cell: without the slab a flat cell's nearest membrane would always be its top.
 // Units:   um.
 // Random:  the caller's point sets.        Threads: pure.
@@ -17,8 +17,7 @@
 
 namespace colony {
 
-inline constexpr std::uint32_t kMembranePoints = 4096;
-inline constexpr std::uint32_t kMassPoints = 4096;
+inline constexpr std::uint32_t kSettlePoints = 4096;
 inline constexpr std::uint32_t kIsolationPoints = 4096;
 inline constexpr std::uint32_t kIsolationPrefix = 256;   // looked at first
 

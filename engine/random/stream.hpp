@@ -23,7 +23,7 @@ enum class Purpose : std::uint8_t {
   kSearch = 7,           // lane = generation: the genetic search
   kSearchPoints = 8,     // scrambling of the search's points
   kFinalPoints = 9,      // scrambling of the winner's fresh points
-  kSettlePoints = 10,    // lane 0: centre of mass, 1: nearest membrane
+  kSettlePoints = 10,    // scrambling: centre of mass and nearest membrane
   kFreeShare = 11,       // scrambling of the disc
   kRetry = 12,           // next cycle after an unlucky search
   kRetained = 13,        // scrambling: a neighbour's retained share; lane 0: in the search, 1: of the winner

@@ -147,14 +147,14 @@ Decision decide_settling(const Colony& colony, const Params& params, Seed seed, 
   const Body& body = colony.body(id);
   const std::vector<const Body*>& neighbours = neighbours_of(colony, id, workspace);
   const ContactRule rule = params.contact.rule;
-  tiled_sobol(kMassPoints, seeds_for(seed, cell, Purpose::kSettlePoints, 0), workspace.points);
+  // One set for both, placed in the body's box and in the slab.
+  tiled_sobol(kSettlePoints, seeds_for(seed, cell, Purpose::kSettlePoints, 0), workspace.points);
   const MassEstimate mass = deformed_mass(body, neighbours, rule, workspace.points, workspace.overlap);
   Settled event;
   // A cell pressed to nothing has no centre of mass: its nucleus stays where it was.
   event.nucleus_um = mass.hit_count > 0 ? mass.centre_um : cell.nucleus_um;
   event.deformed_volume_um3 = mass.volume_um3;
   event.due_h = cell.due_h;
-  tiled_sobol(kMembranePoints, seeds_for(seed, cell, Purpose::kSettlePoints, 1), workspace.points);
   // Inside everywhere in the slab cannot happen for a body within its own box; then the centre stands for m: no plane is fixed.
   event.nearest_membrane_um =
       nearest_membrane_um(body, neighbours, rule, event.nucleus_um, workspace.points, workspace.overlap).value_or(event.nucleus_um);

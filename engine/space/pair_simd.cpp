@@ -147,6 +147,34 @@ void raster_kernel(const FloatBody& body, float edge, std::int32_t nx, std::int3
   }
 }
 
+void add_rows_kernel(const RowRange& rows, std::int32_t first_x, std::int32_t n, std::uint8_t* HWY_RESTRICT counts) {
+  const hn::CappedTag<std::uint8_t, 32> bytes;
+  const std::size_t lanes = hn::Lanes(bytes);
+  const auto one = hn::Set(bytes, std::uint8_t{1});
+  for (std::int32_t z = 0; z < rows.nz; ++z) {
+    for (std::int32_t y = rows.first_y; y < rows.end_y; ++y) {
+      const std::uint32_t* words = rows.words + (z * rows.ny + y) * rows.words_per_row;
+      std::uint8_t* row = counts + (z * n + y) * n;
+      for (std::int32_t word = 0; word < rows.words_per_row; ++word) {
+        std::int32_t x = first_x + 32 * word;
+        std::uint32_t bits = words[word];
+        if (x < 0) {
+          bits = x > -32 ? bits >> -x : 0;
+          x = 0;
+        }
+        if (x + 32 > n) bits = x < n ? bits & ((1U << (n - x)) - 1U) : 0;
+        if (bits == 0) continue;
+        const std::uint64_t padded = bits;  // LoadMaskBits may read 8 bytes
+        for (std::size_t i = 0; i < 32; i += lanes) {
+          const auto mask = hn::LoadMaskBits(bytes, reinterpret_cast<const std::uint8_t*>(&padded) + i / 8);
+          const auto before = hn::LoadU(bytes, row + x + i);
+          hn::StoreU(hn::SaturatedAdd(before, hn::IfThenElseZero(mask, one)), bytes, row + x + i);
+        }
+      }
+    }
+  }
+}
+
 void flag_inside_kernel(const FloatBody& body, const float* x, const float* y, const float* z, std::size_t n, std::uint8_t* flags) {
   const D d;
   const std::size_t lanes = hn::Lanes(d);
@@ -178,6 +206,7 @@ namespace colony::kernel {
 
 HWY_EXPORT(score_pair_kernel);
 HWY_EXPORT(raster_kernel);
+HWY_EXPORT(add_rows_kernel);
 HWY_EXPORT(flag_inside_kernel);
 
 PairScore score_pair(const SearchScene& scene, const std::array<CandidateBody, 2>& pair, ShareLimit most_shared, PairWork& work) {
@@ -187,6 +216,10 @@ PairScore score_pair(const SearchScene& scene, const std::array<CandidateBody, 2
 void raster_rows(const FloatBody& body, float edge, std::int32_t nx, std::int32_t ny, std::int32_t nz, std::int32_t words_per_row,
                  std::uint32_t* rows) {
   HWY_DYNAMIC_DISPATCH(raster_kernel)(body, edge, nx, ny, nz, words_per_row, rows);
+}
+
+void add_rows(const RowRange& rows, std::int32_t first_x, std::int32_t n, std::uint8_t* counts) {
+  HWY_DYNAMIC_DISPATCH(add_rows_kernel)(rows, first_x, n, counts);
 }
 
 void flag_inside(const FloatBody& body, const float* x, const float* y, const float* z, std::size_t n, std::uint8_t* flags) {

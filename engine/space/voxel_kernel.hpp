@@ -12,4 +12,15 @@ namespace colony::kernel {
 void raster_rows(const FloatBody& body, float edge, std::int32_t nx, std::int32_t ny, std::int32_t nz, std::int32_t words_per_row,
                  std::uint32_t* rows);
 
+/// Rows (z, y, word) of a raster, of which those with first_y <= y < end_y count. Eight bytes beyond the last are readable.
+struct RowRange {
+  const std::uint32_t* words;
+  std::int32_t words_per_row, ny, nz;
+  std::int32_t first_y, end_y;
+};
+
+/// Adds 1, up to 255, to counts[(z n + y) n + first_x + i] for every set bit i of row (z, y) with 0 <= first_x + i < n. Writes (unchanged)
+/// up to 32 counts further.
+void add_rows(const RowRange& rows, std::int32_t first_x, std::int32_t n, std::uint8_t* counts);
+
 }  // namespace colony::kernel

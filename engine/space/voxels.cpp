@@ -1,7 +1,6 @@
 #include "engine/space/voxels.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstring>
 
@@ -32,21 +31,11 @@ kernel::FloatBody frame_raster(const Body& body, double edge_um, Raster& out) {
   out.ny = cube_of(box.high.y(), edge_um) - out.y0 + 1;
   out.nz = cube_of(box.high.z(), edge_um) - out.z0 + 1;
   out.words_per_row = (out.nx + 31) / 32;
-  out.rows.assign(static_cast<std::size_t>(out.words_per_row) * static_cast<std::size_t>(out.ny) * static_cast<std::size_t>(out.nz), 0);
+  out.rows.assign(static_cast<std::size_t>(out.words_per_row) * static_cast<std::size_t>(out.ny) * static_cast<std::size_t>(out.nz) + 2, 0);
   return kernel::FloatBody(body, Vec3((out.x0 + 0.5) * edge_um, (out.y0 + 0.5) * edge_um, (out.z0 + 0.5) * edge_um));
 }
 
-// Byte i of the entry is 1 where bit i of the index is set.
-constexpr std::array<std::uint64_t, 256> kBytesOfBits = [] {
-  std::array<std::uint64_t, 256> table{};
-  for (std::size_t bits = 0; bits < 256; ++bits) {
-    for (std::size_t i = 0; i < 8; ++i) {
-      if ((bits >> i) & 1U) table[bits] |= std::uint64_t{1} << (8 * i);
-    }
-  }
-  return table;
-}();
-static_assert(std::endian::native == std::endian::little);
+constexpr std::size_t kPadding = 64;       // whole vectors are written, and one count stays 0
 
 }  // namespace
 
@@ -105,49 +94,21 @@ double voxel_edge_um(const Params& params) {
 VoxelCounts::VoxelCounts(const Params& params) : edge_um_(voxel_edge_um(params)) {
   n_ = static_cast<std::int32_t>(2.0 * search_reach_um(params) / edge_um_) + 4;
   nz_ = static_cast<std::int32_t>(body_top_max_um(params) / edge_um_) + 2;
-  counts_.resize(static_cast<std::size_t>(n_) * static_cast<std::size_t>(n_) * static_cast<std::size_t>(nz_) + 16);
+  counts_.resize(static_cast<std::size_t>(n_) * static_cast<std::size_t>(n_) * static_cast<std::size_t>(nz_) + kPadding);
 }
 
 void VoxelCounts::centre_on(const Vec3& pivot_um) {
   x0_ = cube_of(pivot_um.x(), edge_um_) - n_ / 2;
   y0_ = cube_of(pivot_um.y(), edge_um_) - n_ / 2;
-  added_ = 0;
   std::memset(counts_.data(), 0, counts_.size());
 }
 
 void VoxelCounts::add(const Raster& raster) {
-  ++added_;
-  const std::int32_t first_x = raster.x0 - x0_;
   const std::int32_t first_y = raster.y0 - y0_;
   CHECK(raster.z0 >= 0 && raster.z0 + raster.nz < nz_);
-  // Whole words fit, and no count can overflow: eight cubes at a time.
-  const bool whole = first_x >= 0 && first_x + 32 * raster.words_per_row <= n_ && added_ < 255;
-  for (std::int32_t k = 0; k < raster.nz; ++k) {
-    for (std::int32_t j = std::max(0, -first_y); j < raster.ny && first_y + j < n_; ++j) {
-      const std::uint32_t* words = raster.rows.data() + (k * raster.ny + j) * raster.words_per_row;
-      std::uint8_t* row = counts_.data() + ((raster.z0 + k) * n_ + first_y + j) * n_;
-      for (std::int32_t word = 0; word < raster.words_per_row; ++word) {
-        std::uint32_t bits = words[word];
-        if (bits == 0) continue;
-        const std::int32_t x = first_x + 32 * word;
-        if (whole) {
-          for (int byte = 0; byte < 4; ++byte) {
-            std::uint64_t counts = 0;
-            std::uint8_t* at = row + x + 8 * byte;
-            std::memcpy(&counts, at, 8);
-            counts += kBytesOfBits[(bits >> (8 * byte)) & 255U];
-            std::memcpy(at, &counts, 8);
-          }
-          continue;
-        }
-        for (; bits != 0; bits &= bits - 1) {
-          const std::int32_t at = x + std::countr_zero(bits);
-          if (at < 0 || at >= n_) continue;
-          if (row[at] < 255) ++row[at];
-        }
-      }
-    }
-  }
+  const kernel::RowRange rows{raster.rows.data(), raster.words_per_row, raster.ny, raster.nz, std::max(0, -first_y), std::min(raster.ny, n_ - first_y)};
+  if (rows.first_y >= rows.end_y) return;
+  kernel::add_rows(rows, raster.x0 - x0_, n_, counts_.data() + (raster.z0 * n_ + first_y) * n_);
 }
 
 }  // namespace colony

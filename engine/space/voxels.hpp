@@ -24,7 +24,7 @@ struct Raster {
   std::int32_t x0 = 0, y0 = 0, z0 = 0;   // in edges from the origin of the dish
   std::int32_t nx = 0, ny = 0, nz = 0;
   std::int32_t words_per_row = 0;
-  std::vector<std::uint32_t> rows;       // (z, y, word)
+  std::vector<std::uint32_t> rows;       // (z, y, word); two words to spare
   bool holds(std::int32_t x, std::int32_t y, std::int32_t z) const;
 };
 
@@ -78,7 +78,6 @@ class VoxelCounts {
   std::int32_t n_ = 0;                   // cubes along x and along y
   std::int32_t nz_ = 0;                  // the top layer is never covered
   std::int32_t x0_ = 0, y0_ = 0;
-  std::uint32_t added_ = 0;
   std::vector<std::uint8_t> counts_;
 };
 
