@@ -75,8 +75,7 @@ class Scorer {
     if (params.contact.neighbour_retained_min > 0.0) {
       tiled_sobol(static_cast<std::uint32_t>(params.search.points), seeds_for(task, Purpose::kRetained, 0), ws_.retained_points);
     }
-    ws_.pair.field_count = 0;
-    ws_.pair.noise_count = 0;
+    ws_.overlap.work = {};
   }
 
   /// From here on a candidate is given up once it cannot beat `best` any more: after h hits, when more are shared than
@@ -99,7 +98,7 @@ class Scorer {
     ws_.genes.decode(chromosome, task_.frame, ws_.candidate);
     const kernel::ShareLimit limit = racing_ ? kernel::ShareLimit(ws_.most_shared) : kernel::ShareLimit();
     cover(std::max(ws_.candidate[0].reach, ws_.candidate[1].reach));
-    const kernel::PairScore score = kernel::score_pair(ws_.scene, ws_.candidate, limit, ws_.pair);
+    const kernel::PairScore score = kernel::score_pair(ws_.scene, ws_.candidate, limit, ws_.overlap.work);
     if (score.beyond_wall) return 0.0;
     double fitness = 1.0;
     for (std::size_t k = 0; k < 2; ++k) {
@@ -142,7 +141,7 @@ class Scorer {
     // The margin is for rounding alone.
     for (; covered_ < ws_.by_gap.size() && ws_.by_gap[covered_].gap_um <= 1.0001F * reach_um + 0.001F; ++covered_) {
       const Workspace::Neighbour& other = ws_.by_gap[covered_];
-      ws_.voxels.add(ws_.rasters.of(other.id, *other.body, ws_.pair.field_count));
+      ws_.voxels.add(ws_.rasters.of(other.id, *other.body, ws_.overlap.work.field_count));
     }
   }
 
@@ -187,7 +186,7 @@ class Search {
     result.fitness = scorer_.score_finally(result.pair, result.crosses_wall);
     result.evaluation_count = evaluation_count_;
     result.corrected = corrected_;
-    result.work = {1, evaluation_count_, ws_.pair.field_count, ws_.pair.noise_count};
+    result.work = {1, evaluation_count_, ws_.overlap.work.field_count, ws_.overlap.work.noise_count};
     return result;
   }
 

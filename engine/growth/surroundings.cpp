@@ -90,7 +90,11 @@ std::vector<Woken> wake_sleepers(const Colony& colony, const Params& params, See
   const double radius = params.wake.free_radius_um;
   std::vector<Box> changed;
   if (change.gone) changed.push_back(colony.body(*change.gone).box());
-  for (const Body& body : change.bodies) changed.push_back(body.box());
+  if (params.wake.rule == WakeRule::kAlways) {
+    for (const Body& body : change.bodies) changed.push_back(body.box());
+  }
+  // Rule `share`: only what has gone makes room. Where nothing went, the share is at most what it was when last looked at, and then it had
+  // not grown enough; so nobody there is looked at again.
   if (changed.empty()) return {};
 
   Box area = changed.front();

@@ -53,7 +53,6 @@ struct Workspace {
   std::vector<const Body*> near;
   std::vector<Candidate> population, bred;
   kernel::SearchScene scene;
-  kernel::PairWork pair;
   VoxelCounts voxels;
   RasterCache rasters;
   std::array<kernel::CandidateBody, 2> candidate;

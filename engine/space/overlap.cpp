@@ -51,6 +51,12 @@ bool beyond_wall(const Placement& placement, double wall_radius_um, float x, flo
   return px * px + py * py > wall_radius_um * wall_radius_um;
 }
 
+bool reaches_wall(const Box& box, double wall_radius_um) {
+  const double x = std::max(std::abs(box.low.x()), std::abs(box.high.x()));
+  const double y = std::max(std::abs(box.low.y()), std::abs(box.high.y()));
+  return x * x + y * y > 0.999 * wall_radius_um * wall_radius_um;  // the margin is for rounding alone
+}
+
 }  // namespace
 
 Vec3 placed_um(const Box& box, const PointSet& points, std::size_t i) {
@@ -79,22 +85,26 @@ void count_overlaps(const Body& body, std::span<const Body* const> neighbours, s
 
   const Placement placement(body.box());
   place(placement, points, s);
+  // Bodies that cannot touch count 0; the others stand in s.bodies, and s.indices says whose they are.
+  s.bodies.clear();
+  s.indices.clear();
+  for (std::size_t j = 0; j < neighbours.size(); ++j) {
+    if (!meets(neighbours[j]->box(), body.box()) || separated(*neighbours[j], body)) continue;
+    s.bodies.emplace_back(*neighbours[j], placement.origin);
+    s.indices.push_back(j);
+  }
   hold(s.inside_x, n);
   hold(s.inside_y, n);
   hold(s.inside_z, n);
   out.hit_count = kernel::select_inside(FloatBody(body, placement.origin), s.x.data(), s.y.data(), s.z.data(), n, s.band,
                                         s.inside_x.data(), s.inside_y.data(), s.inside_z.data());
-  if (out.hit_count == 0) return;
-  if (wall_radius_um) {
-    for (std::size_t i = 0; i < out.hit_count; ++i) {
-      if (beyond_wall(placement, *wall_radius_um, s.inside_x[i], s.inside_y[i])) ++out.outside_wall_count;
-    }
-  }
-  for (std::size_t j = 0; j < neighbours.size(); ++j) {
-    if (!meets(neighbours[j]->box(), body.box()) || separated(*neighbours[j], body)) continue;
-    const FloatBody other(*neighbours[j], placement.origin);
-    out.shared_counts[j] =
-        kernel::count_inside(other, s.inside_x.data(), s.inside_y.data(), s.inside_z.data(), out.hit_count, s.band);
+  s.work.field_count += n;
+  s.shared.resize(s.bodies.size());
+  kernel::count_each(s.bodies, s.inside_x.data(), s.inside_y.data(), s.inside_z.data(), out.hit_count, s.shared.data(), s.work);
+  for (std::size_t k = 0; k < s.bodies.size(); ++k) out.shared_counts[s.indices[k]] = s.shared[k];
+  if (!wall_radius_um || !reaches_wall(body.box(), *wall_radius_um)) return;
+  for (std::size_t i = 0; i < out.hit_count; ++i) {
+    if (beyond_wall(placement, *wall_radius_um, s.inside_x[i], s.inside_y[i])) ++out.outside_wall_count;
   }
 }
 

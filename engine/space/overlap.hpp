@@ -38,7 +38,10 @@ struct OverlapScratch {
   std::vector<float> inside_x, inside_y, inside_z;
   kernel::BandBuffer band;
   std::vector<kernel::FloatBody> bodies;
+  std::vector<std::size_t> indices;
+  std::vector<std::uint32_t> shared;
   std::vector<std::uint8_t> flags;
+  kernel::CountWork work;                      // grows with every call
 };
 
 /// Counts for `body` against each of `neighbours` (any that cannot touch count 0). `wall_radius_um`: the dish, centred at the origin.

@@ -8,6 +8,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "engine/shape/body.hpp"
@@ -40,6 +41,15 @@ std::uint32_t count_inside(const FloatBody& body, const float* x, const float* y
 /// The same, and copies the inside points to out_x, out_y, out_z (in no particular order). out may not overlap the input.
 std::uint32_t select_inside(const FloatBody& body, const float* x, const float* y, const float* z, std::size_t n, BandBuffer& band,
                             float* out_x, float* out_y, float* out_z);
+
+struct CountWork {
+  std::uint64_t field_count = 0;     // evaluations of one body's field at one point
+  std::uint64_t noise_count = 0;     // of those, with noise
+};
+
+/// counts[j] = how many of n points are inside bodies[j]. Fast where neighbouring points of the arrays are neighbours in space.
+void count_each(std::span<const FloatBody> bodies, const float* x, const float* y, const float* z, std::size_t n, std::uint32_t* counts,
+                CountWork& work);
 
 /// The twin of one point in plain C++: no shortcut, the noise always evaluated.
 bool is_inside_reference(const FloatBody& body, float x, float y, float z);

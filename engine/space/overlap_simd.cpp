@@ -98,6 +98,38 @@ std::uint32_t select_kernel(const FloatBody& body, const float* x, const float* 
   return scan<true>(body, x, y, z, n, band, out);
 }
 
+// Without copying: where the points of a vector lie close together (tiled_sobol), most vectors need no noise.
+HWY_INLINE hn::Mask<D> inside_of(const FloatBody& b, V x, V y, V z, hn::Mask<D> asked, CountWork& work) {
+  const D d;
+  const V u = row(b.m, b.t[0], x, y, z);
+  const V v = row(b.m + 3, b.t[1], x, y, z);
+  const V w = row(b.m + 6, b.t[2], x, y, z);
+  const V smooth = smooth_field(u, v, w);
+  const auto near = hn::And(asked, hn::Ge(smooth, constant(-b.band)));
+  if (hn::AllFalse(d, near)) return near;
+  const auto inside = hn::And(near, hn::Gt(smooth, constant(b.band)));
+  const auto undecided = hn::AndNot(inside, near);
+  if (hn::AllFalse(d, undecided)) return inside;
+  work.noise_count += hn::CountTrue(d, undecided);
+  const V field = hn::Add(smooth, noise(b, u, v, w));
+  return hn::Or(inside, hn::And(undecided, hn::Ge(field, hn::Zero(d))));
+}
+
+void count_each_kernel(std::span<const FloatBody> bodies, const float* HWY_RESTRICT x, const float* HWY_RESTRICT y, const float* HWY_RESTRICT z,
+                       std::size_t n, std::uint32_t* HWY_RESTRICT counts, CountWork& work) {
+  const D d;
+  const std::size_t lanes = hn::Lanes(d);
+  for (std::size_t j = 0; j < bodies.size(); ++j) {
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < n; i += lanes) {
+      const auto real = hn::FirstN(d, n - i);  // lanes past n hold padding
+      count += hn::CountTrue(d, inside_of(bodies[j], hn::LoadU(d, x + i), hn::LoadU(d, y + i), hn::LoadU(d, z + i), real, work));
+    }
+    counts[j] = static_cast<std::uint32_t>(count);
+  }
+  work.field_count += n * bodies.size();
+}
+
 const char* target_kernel() { return hwy::TargetName(HWY_TARGET); }
 
 }  // namespace colony::kernel::HWY_NAMESPACE
@@ -108,6 +140,7 @@ namespace colony::kernel {
 
 HWY_EXPORT(count_kernel);
 HWY_EXPORT(select_kernel);
+HWY_EXPORT(count_each_kernel);
 HWY_EXPORT(target_kernel);
 
 std::uint32_t count_inside(const FloatBody& body, const float* x, const float* y, const float* z, std::size_t n, BandBuffer& band) {
@@ -119,6 +152,11 @@ std::uint32_t select_inside(const FloatBody& body, const float* x, const float* 
                             float* out_x, float* out_y, float* out_z) {
   band.hold(n);
   return HWY_DYNAMIC_DISPATCH(select_kernel)(body, x, y, z, n, band, out_x, out_y, out_z);
+}
+
+void count_each(std::span<const FloatBody> bodies, const float* x, const float* y, const float* z, std::size_t n, std::uint32_t* counts,
+                CountWork& work) {
+  HWY_DYNAMIC_DISPATCH(count_each_kernel)(bodies, x, y, z, n, counts, work);
 }
 
 const char* vector_target() { return HWY_DYNAMIC_DISPATCH(target_kernel)(); }

@@ -5,7 +5,7 @@
 //          Scoring goes through the points in stages and gives up once too many are shared (ShareLimit).
 // Units:   um relative to the search's origin, single precision.
 // Why the same bits everywhere: as overlap_kernel.hpp: + - * and compares in a fixed order per point; integers leave the kernel.
-// Threads: pure but for what they add to the caller's PairWork.
+// Threads: pure but for what they add to the caller's CountWork.
 // Source:  the paper, 4.1 and 4.3; the common points of all candidates and the voxels are ours (engine/DESIGN.md).
 #pragma once
 
@@ -66,12 +66,7 @@ struct PairScore {
 /// most_shared[h]: a body with more than this many shared among its first h hits is given up. Empty: nobody is.
 using ShareLimit = std::span<const std::uint32_t>;
 
-struct PairWork {
-  std::uint64_t field_count = 0;             // evaluations of a field
-  std::uint64_t noise_count = 0;             // of those, with noise
-};
-
-PairScore score_pair(const SearchScene& scene, const std::array<CandidateBody, 2>& pair, ShareLimit most_shared, PairWork& work);
+PairScore score_pair(const SearchScene& scene, const std::array<CandidateBody, 2>& pair, ShareLimit most_shared, CountWork& work);
 
 /// The twin: every point on its own, the sibling's noise always, nobody given up. The same counts to the last bit.
 PairScore score_pair_reference(const SearchScene& scene, const std::array<CandidateBody, 2>& pair);

@@ -35,7 +35,7 @@ HWY_INLINE V cube_of(V value_less_half) {
 
 // The own points first..last of one body.
 HWY_INLINE Tally tally(const SearchScene& scene, const CandidateBody& body, const FloatBody& sibling, const OwnPoints& own,
-                       std::uint32_t first, std::uint32_t last, PairWork& work, bool& beyond_wall) {
+                       std::uint32_t first, std::uint32_t last, CountWork& work, bool& beyond_wall) {
   const D d;
   const std::size_t lanes = hn::Lanes(d);
   std::size_t hits = 0;
@@ -89,7 +89,7 @@ HWY_INLINE Tally tally(const SearchScene& scene, const CandidateBody& body, cons
 }
 
 PairScore score_pair_kernel(const SearchScene& scene, const std::array<CandidateBody, 2>& pair, ShareLimit most_shared,
-                            PairWork& work) {
+                            CountWork& work) {
   PairScore score;
   const std::size_t stages = scene.own[0].stage_ends.size();
   std::array<std::uint32_t, 2> first = {0, 0};
@@ -209,7 +209,7 @@ HWY_EXPORT(raster_kernel);
 HWY_EXPORT(add_rows_kernel);
 HWY_EXPORT(flag_inside_kernel);
 
-PairScore score_pair(const SearchScene& scene, const std::array<CandidateBody, 2>& pair, ShareLimit most_shared, PairWork& work) {
+PairScore score_pair(const SearchScene& scene, const std::array<CandidateBody, 2>& pair, ShareLimit most_shared, CountWork& work) {
   return HWY_DYNAMIC_DISPATCH(score_pair_kernel)(scene, pair, most_shared, work);
 }
 
