@@ -1,4 +1,4 @@
-// One move at a time: when it comes, where it leads, when it is not made, whom it wakes and what it reads.
+// One move at a time: when it comes, where it leads, and when it is not made.
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -8,46 +8,17 @@
 #include <gtest/gtest.h>
 
 #include "engine/base/check.hpp"
-#include "engine/growth/surroundings.hpp"
 #include "engine/sim/decide_move.hpp"
 #include "engine/space/overlap.hpp"
 #include "tests/support/bodies.hpp"
 #include "tests/support/founding.hpp"
+#include "tests/support/moves.hpp"
 #include "tests/support/runs.hpp"
 #include "tests/support/scale.hpp"
 #include "tests/support/stats.hpp"
 
 namespace colony {
 namespace {
-
-Params crawling(double rate_per_h = 0.1, double bias = 0.5) {
-  Params params = *preset("young-colony");
-  params.motility.rate_per_h = rate_per_h;
-  params.motility.bias = bias;
-  return params;
-}
-
-Moved move_of(const Colony& colony, const Params& params, Seed seed, CellId id, double time_h = 10.0) {
-  Workspace workspace(params);
-  return std::get<Moved>(decide_move(colony, params, seed, id, time_h, workspace).body);
-}
-
-Cell asleep(Cell cell, double free_share) {
-  cell.activity = Activity::kPassive;
-  cell.free_share = free_share;
-  cell.try_count = 2;
-  return cell;
-}
-
-/// A ball and, close around it, `count` others in a ring.
-std::vector<Cell> ring(int count, double distance_um, double radius_um = 5.0) {
-  std::vector<Cell> cells = {testing::ball_at(0.0, 0.0, radius_um)};
-  for (int k = 0; k < count; ++k) {
-    const auto [s, c] = maths::sincos(2.0 * maths::kPi * k / count);
-    cells.push_back(testing::ball_at(distance_um * c, distance_um * s, radius_um));
-  }
-  return cells;
-}
 
 TEST(MoveDelay, IsAFixedRestAndAnExponentialTimeOfMeanOneOverTheRate) {
   for (const double rate : {0.02, 0.1, 0.5, 2.0}) {
@@ -74,7 +45,7 @@ TEST(MoveDelay, IsAFixedRestAndAnExponentialTimeOfMeanOneOverTheRate) {
 }
 
 TEST(MoveDelay, DueTimesAreGivenAtFoundingAtDivisionAndByEveryMoveAndOnlyWithARate) {
-  RunSpec spec = testing::spec_of(2, 60, crawling());
+  RunSpec spec = testing::spec_of(2, 60, testing::crawling());
   const double least = move_delay_min_h(spec.params.motility);
   Colony before(spec.params);
   std::vector<double> first;
@@ -111,11 +82,11 @@ double angle_of(const Moved& moved, const Cell& before) {
 
 TEST(MoveDirection, IsUniformForAnIsolatedCellWhateverTheBias) {
   for (const double bias : {0.0, 0.5, 1.0}) {
-    const Params params = crawling(0.1, bias);
+    const Params params = testing::crawling(0.1, bias);
     const Colony colony = testing::found(params, {testing::ball_at(3.0, -40.0, 5.0), testing::ball_at(80.0, 0.0, 5.0)});
     std::vector<double> sectors(24);
     for (Seed seed = 0; seed < 12'000; ++seed) {
-      const double angle = angle_of(move_of(colony, params, seed, CellId{1}), colony.cell(CellId{1}));
+      const double angle = angle_of(testing::move_of(colony, params, seed, CellId{1}), colony.cell(CellId{1}));
       ++sectors[std::min<std::size_t>(23, static_cast<std::size_t>((angle / (2.0 * maths::kPi) + 0.5) * 24.0))];
     }
     EXPECT_LT(testing::chi_square_uniform(sectors), testing::chi_square_bound(23)) << "bias " << bias;
@@ -124,7 +95,7 @@ TEST(MoveDirection, IsUniformForAnIsolatedCellWhateverTheBias) {
 
 TEST(MoveDirection, LeadsToTheFreerHalfWithTheProbabilityOfTheBiasAndACosineThere) {
   for (const double bias : {0.0, 0.5, 1.0}) {
-    const Params params = crawling(0.1, bias);
+    const Params params = testing::crawling(0.1, bias);
     // The neighbour, at 60 degrees, lies in the surroundings but out of reach of a step.
     const Vec2 towards(0.5, std::sqrt(0.75));
     const Colony colony = testing::found(
@@ -132,7 +103,7 @@ TEST(MoveDirection, LeadsToTheFreerHalfWithTheProbabilityOfTheBiasAndACosineTher
     std::vector<double> away, guided_sines(10);
     constexpr int kDraws = 6000;
     for (Seed seed = 0; seed < kDraws; ++seed) {
-      const Vec2 step = move_of(colony, params, seed, CellId{1}).cell.centre_um.head<2>() / params.motility.step_um;
+      const Vec2 step = testing::move_of(colony, params, seed, CellId{1}).cell.centre_um.head<2>() / params.motility.step_um;
       ASSERT_NEAR(step.norm(), 1.0, 1e-9);
       away.push_back(-step.dot(towards));
       const double sine = step.x() * towards.y() - step.y() * towards.x();
@@ -152,18 +123,18 @@ TEST(MoveDirection, LeadsToTheFreerHalfWithTheProbabilityOfTheBiasAndACosineTher
 }
 
 TEST(MoveDirection, TheDishWallCountsAsCovered) {
-  Params params = crawling(0.1, 1.0);
+  Params params = testing::crawling(0.1, 1.0);
   params.dish.radius_um = 100.0;
   const Colony colony = testing::found(params, {testing::ball_at(0.0, 88.0, 5.0)});
   for (Seed seed = 0; seed < 500; ++seed) {
     const Cell& before = colony.cell(CellId{1});
-    const Moved moved = move_of(colony, params, seed, CellId{1});
+    const Moved moved = testing::move_of(colony, params, seed, CellId{1});
     ASSERT_LT(moved.cell.centre_um.y() - before.centre_um.y(), 0.6) << seed;  // 11 degrees of error of the estimate
   }
 }
 
 TEST(Move, ShiftsTheBodyRigidlyAndKeepsAllElse) {
-  const Params params = crawling();
+  const Params params = testing::crawling();
   std::vector<Cell> cells = testing::scattered_cells(1, 10.0, 5);
   cells[0].nearest_membrane_um = cells[0].centre_um + Vec3(4.0, -1.0, 0.2);
   cells[0].deformed_volume_um3 = 300.0;
@@ -172,7 +143,7 @@ TEST(Move, ShiftsTheBodyRigidlyAndKeepsAllElse) {
   cells[0].move_due_h = 10.0;
   const Colony colony = testing::found(params, cells);
   const Cell& before = colony.cell(CellId{1});
-  const Moved moved = move_of(colony, params, 3, CellId{1});
+  const Moved moved = testing::move_of(colony, params, 3, CellId{1});
   const Vec3 step = moved.cell.centre_um - before.centre_um;
   EXPECT_NEAR(step.norm(), params.motility.step_um, 1e-9);
   EXPECT_EQ(moved.cell.centre_um.z(), before.centre_um.z());
@@ -189,11 +160,11 @@ TEST(Move, ShiftsTheBodyRigidlyAndKeepsAllElse) {
 }
 
 TEST(Move, IsNotMadeByAnEnclosedCellButIsAFactAllTheSame) {
-  const Params params = crawling();
-  const Colony colony = testing::found(params, ring(6, 9.2));
+  const Params params = testing::crawling();
+  const Colony colony = testing::found(params, testing::ring(6, 9.2));
   int made = 0;
   for (Seed seed = 0; seed < 300; ++seed) {
-    const Moved moved = move_of(colony, params, seed, CellId{1});
+    const Moved moved = testing::move_of(colony, params, seed, CellId{1});
     Cell expected = colony.cell(CellId{1});
     expected.ordinal += 1;
     expected.move_due_h = moved.cell.move_due_h;
@@ -204,13 +175,13 @@ TEST(Move, IsNotMadeByAnEnclosedCellButIsAFactAllTheSame) {
 }
 
 TEST(Move, NeverCrossesTheWallEvenWhereFitnessIsNotAsked) {
-  Params params = crawling(0.1, 0.0);
+  Params params = testing::crawling(0.1, 0.0);
   params.contact.fitness_min = 0.0;
   params.dish.radius_um = 50.0;
   const Colony colony = testing::found(params, {testing::ball_at(44.0, 0.0, 5.0)});
   int made = 0, refused = 0;
   for (Seed seed = 0; seed < 400; ++seed) {
-    const Moved moved = move_of(colony, params, seed, CellId{1});
+    const Moved moved = testing::move_of(colony, params, seed, CellId{1});
     (moved.cell.centre_um == colony.cell(CellId{1}).centre_um ? refused : made) += 1;
     const Body body(geometry_of(moved.cell), params.noise);
     const OverlapCounts counts = count_overlaps_reference(body, {}, params.dish.radius_um, testing::points(4096, 1));
@@ -222,7 +193,7 @@ TEST(Move, NeverCrossesTheWallEvenWhereFitnessIsNotAsked) {
 }
 
 TEST(Move, NoneOfACrowdedColonyEndsBelowTheLeastFitness) {
-  RunSpec spec = testing::spec_of(6, testing::scaled(70, 200), crawling(0.5));
+  RunSpec spec = testing::spec_of(6, testing::scaled(70, 200), testing::crawling(0.5));
   spec.params.dish.radius_um = 60.0;
   spec.until.time_h = 200.0;
   Colony before(spec.params), after(spec.params);
@@ -251,7 +222,7 @@ TEST(Move, NoneOfACrowdedColonyEndsBelowTheLeastFitness) {
 }
 
 TEST(Move, OfAnIsolatedCellIsARandomWalk) {
-  Params params = crawling();
+  Params params = testing::crawling();
   params.cycle = {CycleDistribution::kNormal, 200.0, 0.0, 0.0, 0.0};
   RunSpec spec;
   spec.params = params;
@@ -271,133 +242,6 @@ TEST(Move, OfAnIsolatedCellIsARandomWalk) {
   EXPECT_NEAR(square.value, 9.0 * expected, 4.0 * square.se);
   std::printf("figure: mean squared displacement of an isolated cell in 150 h: %.1f +- %.1f um2 (rate step2 t = %.1f)\n",
               square.value, square.se, 9.0 * 15.0);
-}
-
-TEST(MoveWaking, ASleeperThatCrawlsIntoTheOpenWakesItself) {
-  const Params params = crawling(0.1, 1.0);
-  std::vector<Cell> cells = ring(3, 9.5);
-  cells.resize(3);
-  const double share = free_share(testing::found(params, cells), params, 1, cells[0], 0, {});
-  int woke = 0, made = 0;
-  for (Seed seed = 0; seed < 60; ++seed) {
-    std::vector<Cell> sleeping = cells;
-    sleeping[0] = asleep(cells[0], share - 0.05);
-    const Colony colony = testing::found(params, sleeping);
-    const Moved moved = move_of(colony, params, seed, CellId{1}, 10.0);
-    if (moved.cell.centre_um == colony.cell(CellId{1}).centre_um) {
-      EXPECT_FALSE(moved.cell.due_h);
-      continue;
-    }
-    ++made;
-    if (!moved.cell.due_h) continue;
-    ++woke;
-    EXPECT_EQ(*moved.cell.due_h, 10.0 + params.wake.retry_h);
-    EXPECT_EQ(moved.cell.try_count, 0);
-    EXPECT_EQ(moved.cell.activity, Activity::kPassive);
-    EXPECT_GE(*moved.cell.free_share, share - 0.05 + params.wake.gain);
-  }
-  EXPECT_GT(made, 30);
-  EXPECT_GT(woke, made * 9 / 10);  // away from both neighbours the share only grows
-}
-
-TEST(MoveWaking, ASleeperThatCannotMoveKeepsItsGrowthSoFarThroughEveryChangeOfPoints) {
-  const Params params = crawling();
-  std::vector<Cell> cells = ring(5, 9.2);
-  cells[0] = asleep(cells[0], 0.40);
-  cells[0].move_due_h = 0.0;
-  Colony colony = testing::found(params, cells);
-  const auto growth = [&] {
-    const Cell& cell = colony.cell(CellId{1});
-    return free_share(colony, params, 9, cell, cell.ordinal, {}) - *cell.free_share;
-  };
-  const double before = growth();
-  int refused = 0;
-  for (int k = 0; k < 60; ++k) {
-    Event event;
-    event.seq = colony.last_seq() + 1;
-    event.time_h = 1.0 + k;
-    event.cell_id = CellId{1};
-    event.body = move_of(colony, params, 9, CellId{1}, event.time_h);
-    if (std::get<Moved>(event.body).cell.centre_um != colony.cell(CellId{1}).centre_um) continue;
-    ++refused;
-    canonicalise(event);
-    event.digest = digest_after(colony.digest(), event);
-    colony.apply(event);
-    ASSERT_FALSE(colony.cell(CellId{1}).due_h);
-    ASSERT_EQ(growth(), before) << k;  // multiples of 1/512: exact
-  }
-  EXPECT_GT(refused, 30);
-}
-
-TEST(MoveReach, NothingBeyondTheStatedDistanceIsReadOrWritten) {
-  Params params = crawling(0.1, 0.8);
-  params.wake.gain = 0.0;
-  params.contact.fitness_min = 0.0;  // every move is made: the more to be read
-  params.motility.step_um = 9.0;
-  // The largest cell that a division can make, across the axes in turn: the bound must hold for it.
-  const double volume = params.cell.pair_volume_um3.high * (1.0 - params.cell.smaller_share.low);
-  const Vec3 largest = semiaxes_um(volume, params.cell.elongation.high, params.cell.flatness.low);
-  const double reach = move_read_reach_um(params), wake = move_wake_reach_um(params);
-  ASSERT_LT(move_body_reach_um(params), wake);
-  ASSERT_LT(wake, reach);
-  int woken = 0, made = 0, beyond = 0;
-  for (std::uint32_t scene = 0; scene < testing::scaled<std::uint32_t>(400, 4000); ++scene) {
-    std::vector<Cell> cells = testing::scattered_cells(260, 260.0, scene + 1);
-    for (std::size_t i = 0; i < cells.size(); ++i) {
-      if (i % 2 == 0) cells[i] = asleep(cells[i], 0.3);
-    }
-    const CellId id{1};
-    cells[0] = testing::cell_at(0.0, 0.0, largest);
-    cells[0].rotation_rad = Vec3(0.0, 0.0, scene % 2 == 0 ? 0.0 : 0.5 * maths::kPi);
-    const Colony colony = testing::found(params, cells);
-    const Vec3 c = colony.cell(id).centre_um;
-    const Box square = {c - Vec3(reach, reach, 1e3), c + Vec3(reach, reach, 1e3)};
-    // All that lies beyond the reach goes elsewhere: the decision must not change.
-    for (const Cell& cell : colony.cells()) {
-      if (meets(colony.body(cell.id).box(), square)) continue;
-      ++beyond;
-      cells[cell.id.value - 1].centre_um += Vec3(5000.0 + 31.0 * cell.id.value, 0.0, 0.0);
-      cells[cell.id.value - 1].nucleus_um = cells[cell.id.value - 1].centre_um;
-    }
-    const Moved moved = move_of(colony, params, scene, id);
-    ASSERT_EQ(moved, move_of(testing::found(params, cells), params, scene, id)) << "scene " << scene;
-    if (moved.cell.centre_um != c) ++made;
-    for (const Box& box : {colony.body(id).box(), Body(geometry_of(moved.cell), params.noise).box()}) {
-      for (int axis = 0; axis < 2; ++axis) {
-        ASSERT_LE(box.high[axis] - c[axis], move_body_reach_um(params));
-        ASSERT_LE(c[axis] - box.low[axis], move_body_reach_um(params));
-      }
-    }
-    for (const Woken& one : moved.woken) {
-      ++woken;
-      const Vec3 apart = colony.cell(one.cell_id).centre_um - c;
-      ASSERT_LE(std::max(std::abs(apart.x()), std::abs(apart.y())), wake);
-    }
-  }
-  EXPECT_GT(made, 300);
-  EXPECT_GT(woken, 300);
-  EXPECT_GT(beyond, 10'000);
-}
-
-TEST(MoveEnd, AColonyOfSenescentCellsIsOverThoughTheyCouldCrawl) {
-  RunSpec spec = testing::spec_of(4, 100'000, crawling());
-  spec.params.division.generation_limit = 3;
-  const testing::Run run = testing::run(spec);  // no bound in time: it must end by itself
-  EXPECT_EQ(run.finished().reason, FinishReason::kAllSenescent);
-  EXPECT_FALSE(run.simulator.agenda().empty());
-}
-
-TEST(MoveEnd, MovesGoOnToTheBoundInTimeWhereCellsOnlySleep) {
-  RunSpec spec = testing::spec_of(3, 100, crawling());
-  spec.params.contact.fitness_min = 1.0;  // the pair always overlaps itself: nobody ever divides
-  spec.params.contact.fitness_good = 1.0;
-  spec.params.search.distance = {0.3, 0.3};
-  spec.params.search.generations = 0;
-  spec.params.search.corrector_generations = 0;
-  spec.until.time_h = 400.0;
-  const testing::Run run = testing::run(spec);
-  EXPECT_EQ(run.finished().reason, FinishReason::kTime);
-  EXPECT_GT(run.events.size(), 25U);
 }
 
 }  // namespace
