@@ -131,8 +131,13 @@ class CrossCheck {
       errors_.push_back({"/cell/nucleus_radius_um", "the largest nucleus must fit the smallest cell, whose shorter horizontal semiaxis is " +
                                                         text_of(smallest_semiaxis_um(p)) + " um"});
     }
-    if (sound({"/motility/rate_per_h"}) && p.motility.rate_per_h > 0) {
-      errors_.push_back({"/motility/rate_per_h", "moves are not simulated by this version; only 0 is accepted"});
+    const bool moves = sound({"/motility/rate_per_h"}) && p.motility.rate_per_h > 0.0;
+    if (moves && p.motility.rate_per_h < kMoveRateMin_per_h) {
+      errors_.push_back({"/motility/rate_per_h", "must be 0 (no moves) or at least " + text_of(kMoveRateMin_per_h) + " 1/h"});
+    }
+    if (moves && sound({"/window_h"}) && p.window_h > move_delay_min_h(p.motility)) {
+      errors_.push_back({"/window_h", "must be at most " + text_of(move_delay_min_h(p.motility)) +
+                                          " h, the shortest time between two moves at this motility.rate_per_h"});
     }
     if (sound({"/layers"}) && p.layers != Layers::kMono) errors_.push_back({"/layers", "only mono is simulated by this version"});
   }
@@ -153,7 +158,7 @@ class CrossCheck {
   const std::size_t own_count_;  // of the range errors, which come first
 };
 
-constexpr std::array<std::string_view, 2> kPresets = {"paper", "clonogenic"};
+constexpr std::array<std::string_view, 3> kPresets = {"paper", "young-colony", "clonogenic"};
 
 }  // namespace
 
@@ -161,6 +166,7 @@ std::span<const std::string_view> preset_names() { return kPresets; }
 
 std::string_view preset_text(std::string_view name) {
   if (name == "paper") return "one cell grows into a contact-inhibited monolayer, with the parameters of the paper";
+  if (name == "young-colony") return "as paper, but the cells crawl: a young colony whose cells stand almost separately";
   if (name == "clonogenic") return "100 founders over a disc of a 96-well plate's well: separate colonies in one dish";
   return {};
 }
@@ -168,6 +174,10 @@ std::string_view preset_text(std::string_view name) {
 std::optional<Params> preset(std::string_view name) {
   Params params;
   if (name == "paper") return params;
+  if (name == "young-colony") {
+    params.motility.rate_per_h = 0.1;
+    return params;
+  }
   if (name == "clonogenic") {
     // A well of a 96-well plate has a diameter of about 6.4 mm.
     params.dish.radius_um = 3200.0;
@@ -192,6 +202,8 @@ Interval cycle_range_h(const Params& params) {
   const double half = cycle.distribution == CycleDistribution::kNormal ? 3.0 * cycle.sd_h : cycle.half_range_h;
   return {cycle.mean_h - half, cycle.mean_h + half};
 }
+
+double move_delay_min_h(const MotilityParams& motility) { return std::min(1.0, 0.5 / motility.rate_per_h); }
 
 namespace {
 /// sqrt(AB) of the largest cell that a division or a founding can make.

@@ -82,7 +82,7 @@ struct WakeParams {
   std::int64_t tries_max = 3;
 };
 struct MotilityParams {
-  double rate_per_h = 0.0;
+  double rate_per_h = 0.0;         // 0: no moves; else at least kMoveRateMin_per_h
   double step_um = 3.0;
   double bias = 0.5;
 };
@@ -112,6 +112,8 @@ struct Params {
 };
 
 inline constexpr std::int64_t kFoundersMax = 100'000;
+/// Rarer moves would not come within the longest job, and their mean wait would lose its meaning as a number.
+inline constexpr double kMoveRateMin_per_h = 1e-6;
 
 /// How a parameter is stored. The accessor gives the field inside a Params.
 template <class T>
@@ -139,7 +141,7 @@ struct ParamInfo {
 /// All parameters, in the order of the documentation.
 std::span<const ParamInfo> param_table();
 
-/// "paper", "clonogenic"; those that need what this version does not simulate are absent.
+/// "paper", "young-colony", "clonogenic"; those that need what this version does not simulate are absent.
 std::span<const std::string_view> preset_names();
 /// One line about a preset, for people.
 std::string_view preset_text(std::string_view name);
@@ -153,6 +155,9 @@ std::vector<FieldError> validate(const Params& params, const std::vector<FieldEr
 
 /// Shortest and longest cycle that can be drawn, h.
 Interval cycle_range_h(const Params& params);
+/// Shortest time between two moves of a cell, h: 1 h, or half of the mean 1 / rate_per_h where that is shorter. It must not depend on the
+/// window, which cannot change a result. rate_per_h > 0.
+double move_delay_min_h(const MotilityParams& motility);
 /// Largest distance of any point of a body's bounding box from its centre along x or y, over all parameters allowed, um.
 double body_half_extent_max_um(const Params& params);
 /// Highest point above the dish of any body's bounding box, over all parameters allowed, um.

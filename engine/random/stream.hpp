@@ -27,6 +27,10 @@ enum class Purpose : std::uint8_t {
   kFreeShare = 11,       // scrambling of the disc
   kRetry = 12,           // next cycle after an unlucky search
   kRetained = 13,        // scrambling: a neighbour's retained share; lane 0: in the search, 1: of the winner
+  kMoveDelay = 14,       // time to the next move; lane 0: the cell itself, 1: the daughter of its division
+  kMove = 15,            // of a move: guided or not, and the direction
+  kMoveSurroundings = 16,  // scrambling of the disc in which a move looks for the freer half
+  kMovePoints = 17,      // scrambling of the points on which a moved body is scored
 };
 
 class Stream {

@@ -11,6 +11,7 @@
 #include "engine/growth/surroundings.hpp"
 #include "engine/model/cycle.hpp"
 #include "engine/random/sobol.hpp"
+#include "engine/sim/decide_move.hpp"
 #include "engine/space/overlap.hpp"
 
 namespace colony {
@@ -131,6 +132,12 @@ Decision decide_division(const Colony& colony, const Params& params, Seed seed, 
   event.cells[0].parent_id = parent.parent_id;
   event.cells[0].ordinal = parent.ordinal + 1;
   event.cells[1].parent_id = parent.id;
+  if (params.motility.rate_per_h > 0.0) {
+    // The cell that keeps the id keeps its own next move, so that no event takes anything out of a window.
+    event.cells[0].move_due_h = parent.move_due_h;
+    Stream delays(seed, id, parent.ordinal, Purpose::kMoveDelay, 1);
+    event.cells[1].move_due_h = time_h + draw_move_delay_h(params.motility, delays);
+  }
   event.plane_point_um = parent.nucleus_um;
   event.plane_normal = task.frame.direction;
   event.direction = found.pair.direction;

@@ -9,6 +9,7 @@
 #include "engine/growth/chromosome.hpp"
 #include "engine/model/cycle.hpp"
 #include "engine/random/stream.hpp"
+#include "engine/sim/decide_move.hpp"
 #include "engine/sim/simulator.hpp"
 #include "engine/space/overlap.hpp"
 
@@ -79,6 +80,10 @@ class FounderPlacer {
     cell.born_h = due_h - cycle_h;
     cell.due_h = due_h;
     cell.settle_due_h = std::max(0.0, cell.born_h + params_.division.settle_h);
+    if (params_.motility.rate_per_h > 0.0) {
+      Stream delays(spec_.seed, id, 0, Purpose::kMoveDelay);
+      cell.move_due_h = draw_move_delay_h(params_.motility, delays);  // a seeded cell attaches first
+    }
     return cell;
   }
 

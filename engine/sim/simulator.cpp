@@ -5,6 +5,7 @@
 #include "engine/base/check.hpp"
 #include "engine/base/float_mode.hpp"
 #include "engine/sim/decide.hpp"
+#include "engine/sim/decide_move.hpp"
 
 namespace colony {
 namespace {
@@ -55,10 +56,9 @@ Event Simulator::finish(FinishReason reason) {
 
 std::optional<FinishReason> Simulator::reason_to_finish() const {
   if (spec_.until.cells && colony_.cells().size() >= *spec_.until.cells) return FinishReason::kCells;
-  if (agenda_.empty()) {
-    return colony_.count(Activity::kSenescent) == colony_.cells().size() ? FinishReason::kAllSenescent
-                                                                         : FinishReason::kExhausted;
-  }
+  // Senescent cells may still crawl, for ever: nothing else can come of it, so the colony is at its end.
+  if (colony_.count(Activity::kSenescent) == colony_.cells().size()) return FinishReason::kAllSenescent;
+  if (agenda_.empty()) return FinishReason::kExhausted;
   if (spec_.until.time_h && agenda_.first().due_h > *spec_.until.time_h) return FinishReason::kTime;
   return std::nullopt;
 }
@@ -99,7 +99,9 @@ std::optional<Event> Simulator::step() {
     case DueKind::kDivide:
       decision = decide_division(colony_, spec_.params, spec_.seed, item.cell_id, item.due_h, workspace_, stop_);
       break;
-    case DueKind::kMove: CHECK(false && "moves are refused by validate()"); break;
+    case DueKind::kMove:
+      decision = decide_move(colony_, spec_.params, spec_.seed, item.cell_id, item.due_h, workspace_);
+      break;
   }
   work_ += decision.work;
   event.body = std::move(decision.body);

@@ -12,8 +12,7 @@ namespace {
 constexpr std::array<std::string_view, 6> kSpecNames = {"name", "labels", "seed", "preset", "until", "model"};
 constexpr std::array<std::string_view, 2> kUntilNames = {"time_h", "cells"};
 // Presets of the model that need what this version does not simulate.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 2> kLaterPresets = {
-    {{"young-colony", "moves of cells (motility)"}, {"tumour", "several layers"}}};
+constexpr std::array<std::pair<std::string_view, std::string_view>, 1> kLaterPresets = {{{"tumour", "several layers"}}};
 
 constexpr const char* kSummary = "the job spec is wrong; nothing was stored";
 

@@ -68,6 +68,9 @@ Json event_union() {
   divided.update(search_fields());
   Json inhibited = {{"free_share", share()}, {"try_count", count()}, {"due_h", nullable("number")}};
   inhibited.update(search_fields());
+  Json moved = event_schema(EventKind::kMoved, {{"cell", reference("Cell")}, {"woken", list_of("Woken")}});
+  moved["description"] =
+      "an amoeboid move; one that found no place is told as well, with the cell where it was and a new move_due_h";
   const Json settled = {{"nucleus_um", vec3()},
                         {"nearest_membrane_um", vec3()},
                         {"deformed_volume_um3", typed("number")},
@@ -76,7 +79,7 @@ Json event_union() {
            Json::array({event_schema(EventKind::kFounded, {{"cell", reference("Cell")}}),
                         event_schema(EventKind::kDivided, divided), event_schema(EventKind::kInhibited, inhibited),
                         event_schema(EventKind::kSettled, settled),
-                        event_schema(EventKind::kMoved, {{"cell", reference("Cell")}, {"woken", list_of("Woken")}}),
+                        moved,
                         event_schema(EventKind::kSenesced, Json::object()),
                         event_schema(EventKind::kFinished, {{"reason", names_upto(FinishReason::kEngineChanged)},
                                                             {"cell_count", count()}})})}};

@@ -20,6 +20,9 @@ constexpr double kSearchesPerCell = 2.4;
 constexpr double kEvaluations = 32.0 * 8.0 * 256.0;
 constexpr double kMemoryPerCell = 1500.0, kMemoryBase = 30e6;
 constexpr double kStoredPerCell = 3000.0;
+// Of a move tried: it looks at the surroundings of its neighbours and is stored with its cell, made or not. A colony of linear radius
+// has a third of its last cells on average.
+constexpr double kWallPerMove_s = 0.25e-3, kStoredPerMove = 500.0, kMeanOfLastCells = 1.0 / 3.0;
 
 double cells_of_colony(double cycles) {
   const double exponential_cycles = std::log2(kCellsExponential);
@@ -59,8 +62,10 @@ Estimate estimate(const RunSpec& spec) {
   const double generations = static_cast<double>(p.search.generations + p.search.corrector_generations);
   const double evaluations = static_cast<double>(p.search.population * p.search.points) * (1.0 + generations / 2.0);
   out.wall_s = cells * kSearchesPerCell * kWallPerSearch_s * std::max(0.1, evaluations / kEvaluations);
+  const double moves = p.motility.rate_per_h * out.time_h * cells * kMeanOfLastCells;
+  out.wall_s += moves * kWallPerMove_s;
   out.memory_bytes = static_cast<std::uint64_t>(kMemoryBase + cells * kMemoryPerCell);
-  out.stored_bytes = static_cast<std::uint64_t>(cells * kStoredPerCell);
+  out.stored_bytes = static_cast<std::uint64_t>(cells * kStoredPerCell + moves * kStoredPerMove);
   out.basis =
       "growth law of preset paper (doubling, then linear radius) scaled by cycle.mean_h; fixed cost per search on one "
       "core of 2024; expect a factor of three either way, more for unusual models";

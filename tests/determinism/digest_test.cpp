@@ -52,6 +52,16 @@ std::map<std::string, RunSpec> scenes() {
   spec.params.division.generation_limit = 5;
   spec.params.noise = {0.45, 3.0, 0.5};
   all["roulette-no-inhibition-five-generations"] = spec;
+
+  all["young-colony-seed-1-to-110-cells"] = testing::spec_of(1, 110, *preset("young-colony"));
+
+  spec = testing::spec_of(7, 100'000, *preset("young-colony"));
+  spec.params.motility = {0.5, 4.0, 0.8};
+  spec.params.founders.count = 8;
+  spec.params.founders.radius_um = 40.0;
+  spec.params.dish.radius_um = 60.0;
+  spec.until = {std::nullopt, 60.0};
+  all["many-moves-8-founders-dish-60-h"] = spec;
   return all;
 }
 
@@ -93,6 +103,21 @@ TEST(Digests, DoNotDependOnTheWindow) {
       const std::string found = digest_of(spec);
       if (expected.empty()) expected = found;
       EXPECT_EQ(found, expected) << testing::name_of_run(spec) << " window " << window_h;
+    }
+  }
+}
+
+TEST(Digests, DoNotDependOnTheWindowWithMovesEither) {
+  for (const double rate_per_h : {0.1, 0.5}) {
+    std::string expected;
+    for (const double window_h : {1.0, 0.01, 0.1, 0.25, 0.7}) {
+      RunSpec spec = testing::spec_of(8, 60, *preset("young-colony"));
+      spec.params.motility.rate_per_h = rate_per_h;
+      spec.params.window_h = window_h;
+      ASSERT_TRUE(validate(spec.params).empty());
+      const std::string found = digest_of(spec);
+      if (expected.empty()) expected = found;
+      EXPECT_EQ(found, expected) << testing::name_of_run(spec) << " window " << window_h << " rate " << rate_per_h;
     }
   }
 }

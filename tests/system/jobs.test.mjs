@@ -227,6 +227,29 @@ test('submission', async (t) => {
     assert.ok(job.progress.time_h <= 30);
   });
 
+  await t.test('the cells of a young colony move, and those that cannot are told too', async () => {
+    const job = await finishedJob(server, { preset: 'young-colony', seed: 3, until: { cells: 25 } });
+    const places = new Map();
+    let made = 0, moved = 0;
+    for (const event of await allEvents(server, job.id)) {
+      for (const cell of event.cells ?? (event.cell ? [event.cell] : [])) {
+        if (event.kind === 'moved') {
+          const [x, y] = places.get(cell.cell_id);
+          const step = Math.hypot(cell.x_um - x, cell.y_um - y);
+          assert.ok(step === 0 || Math.abs(step - 3) < 1e-9, `a step of ${step} um`);
+          assert.ok(cell.move_due_h >= event.time_h + 1);
+          moved += 1;
+          made += step > 0 ? 1 : 0;
+        }
+        places.set(cell.cell_id, [cell.x_um, cell.y_um]);
+      }
+    }
+    assert.ok(made > 5 && moved >= made, `${made} of ${moved}`);
+    const { json } = await server.get(`/v1/jobs/${job.id}/cells`);
+    assert.deepEqual(json.items.map((cell) => [cell.x_um, cell.y_um]), json.items.map((cell) => places.get(cell.cell_id)));
+    assert.ok(json.items.every((cell) => cell.move_due_h > 0));
+  });
+
   await t.test('several founders over a disc, and at given positions', async () => {
     const disc = await finishedJob(server, { preset: 'clonogenic', seed: 4, until: { time_h: 5 }, model: { founders: { count: 12, radius_um: 300 } } });
     const events = await allEvents(server, disc.id);

@@ -73,7 +73,7 @@ TEST(Spec, OneFaultIsNamedByItsPointer) {
       {R"({"until": {"cells": 1}, "seed": 99999999999999999999})", "/seed"},
       {R"({"until": {"cells": 1}, "preset": "made-up"})", "/preset"},
       {R"({"until": {"cells": 1}, "preset": "tumour"})", "/preset"},
-      {R"({"until": {"cells": 1}, "preset": "young-colony"})", "/preset"},
+      {R"({"until": {"cells": 1}, "preset": "young-colonies"})", "/preset"},
       {R"({"until": {"cells": 1}, "preset": null})", "/preset"},
       {R"({"until": {"cells": 1}, "name": 7})", "/name"},
       {R"({"until": {"cells": 1}, "name": "a\nb"})", "/name"},
@@ -104,7 +104,9 @@ TEST(Spec, OneFaultIsNamedByItsPointer) {
       {with_model(R"({"noise": {"amplitude": 0.42, "frequency": 6}})"), "/model/noise/amplitude"},
       {with_model(R"({"noise": {"frequency": 1.9}})"), "/model/noise/frequency"},
       {with_model(R"({"layers": "multi"})"), "/model/layers"},
-      {with_model(R"({"motility": {"rate_per_h": 0.1}})"), "/model/motility/rate_per_h"},
+      {with_model(R"({"motility": {"rate_per_h": 2.1}})"), "/model/motility/rate_per_h"},
+      {with_model(R"({"motility": {"rate_per_h": 1e-9}})"), "/model/motility/rate_per_h"},
+      {with_model(R"({"motility": {"rate_per_h": 1}})"), "/model/window_h"},
       {with_model(R"({"dish": {"radius_um": -100}})"), "/model/dish/radius_um"},
       {with_model(R"({"founders": {"count": 0}})"), "/model/founders/count"},
       {with_model(R"({"founders": {"count": 100001}})"), "/model/founders/count"},
@@ -242,6 +244,9 @@ TEST(EstimateOfAJob, StaysWithinItsBoundsAndNamesItsBasis) {
   EXPECT_LT(of(R"({"until": {"time_h": 50}})").cells, 40u);
   EXPECT_LT(of(R"({"until": {"cells": 100}})").wall_s, of(R"({"until": {"cells": 1000}})").wall_s);
   EXPECT_FALSE(of(R"({"until": {"cells": 100}})").basis.empty());
+  EXPECT_GT(of(R"({"until": {"cells": 100}, "preset": "young-colony"})").stored_bytes,
+            of(R"({"until": {"cells": 100}})").stored_bytes)
+      << "moves are stored";
 }
 
 }  // namespace

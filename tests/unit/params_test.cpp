@@ -211,8 +211,25 @@ TEST(Validate, RulesBetweenParametersHoldAtTheirEdge) {
        [](Params& p) { p.division.settle_h = 1.0; }},
       {"window at most retry", "/window_h", [](Params& p) { p.wake.retry_h = 0.9; },
        [](Params& p) { p.wake.retry_h = 1.0; }},
-      {"no moves yet", "/motility/rate_per_h", [](Params& p) { p.motility.rate_per_h = 0.1; },
-       [](Params& p) { p.motility.rate_per_h = 0.0; }},
+      {"no moves, or moves that come within a job", "/motility/rate_per_h",
+       [](Params& p) { p.motility.rate_per_h = 9e-7; }, [](Params& p) { p.motility.rate_per_h = 1e-6; }},
+      {"window at most the shortest time between moves", "/window_h", [](Params& p) { p.motility.rate_per_h = 0.51; },
+       [](Params& p) { p.motility.rate_per_h = 0.50; }},
+      {"the same at the highest rate", "/window_h",
+       [](Params& p) {
+         p.motility.rate_per_h = 2.0;
+         p.window_h = 0.26;
+       },
+       [](Params& p) {
+         p.motility.rate_per_h = 2.0;
+         p.window_h = 0.25;
+       }},
+      {"the same at a low rate", "/window_h",
+       [](Params& p) {
+         p.motility.rate_per_h = 0.1;
+         p.window_h = 1.01;
+       },
+       [](Params& p) { p.motility.rate_per_h = 0.1; }},
       {"one layer yet", "/layers", [](Params& p) { p.layers = Layers::kMulti; },
        [](Params& p) { p.layers = Layers::kMono; }},
   };

@@ -16,11 +16,18 @@
 namespace colony {
 namespace {
 
-// What the model says about one division's `woken`, from the colonies before and after it and by brute force over all
+// What the model says about the `woken` of one division or move, from the colonies before and after it and by brute force over all
 // cells.
 void check_woken(const RunSpec& spec, const Colony& before, const Colony& after, const Event& event, int& woken_count) {
   const std::vector<Woken>* woken = nullptr;
   if (const auto* divided = std::get_if<Divided>(&event.body)) woken = &divided->woken;
+  if (const auto* moved = std::get_if<Moved>(&event.body)) {
+    woken = &moved->woken;
+    if (moved->cell.centre_um == before.cell(*event.cell_id).centre_um) {
+      EXPECT_TRUE(woken->empty()) << "seq " << event.seq;
+      return;
+    }
+  }
   if (woken == nullptr) return;
   for (const Cell& cell : before.cells()) {
     const bool sleeping = cell.activity == Activity::kPassive && !cell.due_h && cell.id != *event.cell_id;
@@ -35,7 +42,7 @@ void check_woken(const RunSpec& spec, const Colony& before, const Colony& after,
       const double dy = std::max({box.low.y() - cell.centre_um.y(), 0.0, cell.centre_um.y() - box.high.y()});
       return std::sqrt(dx * dx + dy * dy);
     };
-    const Cell& daughter = after.cells().back();
+    const Cell& daughter = event.kind() == EventKind::kDivided ? after.cells().back() : after.cell(*event.cell_id);
     const bool near = std::min({distance(before.body(*event.cell_id).box()), distance(after.body(*event.cell_id).box()),
                                 distance(after.body(daughter.id).box())}) <= spec.params.wake.free_radius_um;
     // The share as it is after the event, from the colony as it is after the event.
@@ -66,6 +73,47 @@ TEST(Waking, WakesExactlyTheSleepersNearAChangeThatGainedRoom) {
     }
     std::printf("%s: %d woken\n", rule == WakeRule::kShare ? "share" : "always", woken);
     EXPECT_GT(woken, rule == WakeRule::kShare ? 3 : 100);
+  }
+}
+
+// What it says about a sleeper that moves or fails to: its own share is asked on the points of its old ordinal.
+void check_mover(const RunSpec& spec, const Colony& before, const Colony& after, const Event& event, int& woke, int& slept) {
+  if (event.kind() != EventKind::kMoved) return;
+  const Cell &was = before.cell(*event.cell_id), &is = after.cell(*event.cell_id);
+  if (was.activity != Activity::kPassive || was.due_h) return;
+  const bool made = is.centre_um != was.centre_um;
+  const double share = free_share(after, spec.params, spec.seed, is, was.ordinal, {});
+  const bool wakes = made && (spec.params.wake.rule == WakeRule::kAlways || share >= *was.free_share + spec.params.wake.gain);
+  ASSERT_EQ(is.due_h.has_value(), wakes) << "seq " << event.seq;
+  if (wakes) {
+    ++woke;
+    EXPECT_EQ(*is.free_share, share);
+    EXPECT_EQ(*is.due_h, event.time_h + spec.params.wake.retry_h);
+    EXPECT_EQ(is.try_count, 0);
+  } else {
+    ++slept;
+    const double on_new_points = free_share(after, spec.params, spec.seed, is, is.ordinal, {});
+    EXPECT_EQ(*is.free_share, std::clamp(*was.free_share + (on_new_points - share), 0.0, 1.0));
+    EXPECT_EQ(is.try_count, was.try_count);
+  }
+}
+
+TEST(Waking, AMoveWakesAsADivisionDoesAndTheMoverItself) {
+  for (const WakeRule rule : {WakeRule::kShare, WakeRule::kAlways}) {
+    RunSpec spec = testing::spec_of(4, testing::scaled(70, 200), *preset("young-colony"));
+    spec.params.wake.rule = rule;
+    const testing::Run run = testing::run(spec);
+    Colony before(spec.params), after(spec.params);
+    int woken = 0, woke = 0, slept = 0;
+    for (const Event& event : run.events) {
+      after.apply(event);
+      if (event.kind() == EventKind::kMoved) check_woken(spec, before, after, event, woken);
+      check_mover(spec, before, after, event, woke, slept);
+      before.apply(event);
+    }
+    std::printf("%s: %d woken by moves, %d movers woke, %d slept on\n", rule == WakeRule::kShare ? "share" : "always", woken, woke, slept);
+    EXPECT_GT(woken, 3);
+    EXPECT_GT(woke + slept, 3);
   }
 }
 
