@@ -50,8 +50,9 @@ class Scorer {
     crosses_wall_ = false;
     for (std::size_t k = 0; k < 2; ++k) {
       neighbours_.clear();
+      const Box own = bodies[k].box();
       for (const Body* other : bodies_) {
-        if (meets(other->box(), bodies[k].box())) neighbours_.push_back(other);
+        if (meets(other->box(), own)) neighbours_.push_back(other);
       }
       neighbours_.push_back(&bodies[1 - k]);
       count_overlaps(bodies[k], neighbours_, params_.dish.radius_um, points, scratch_, counts_);

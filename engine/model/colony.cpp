@@ -23,6 +23,7 @@ const Body& Colony::body(CellId id) const {
 void Colony::cells_meeting(const Box& box, std::vector<CellId>& out) const {
   grid_.candidates(box, out);
   std::erase_if(out, [&](CellId id) { return !meets(bodies_[id.value - 1].box(), box); });
+  std::sort(out.begin(), out.end());  // ids differ: one order only
 }
 
 void Colony::set_activity(Cell& cell, Activity activity) {
