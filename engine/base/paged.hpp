@@ -97,6 +97,11 @@ class Paged {
     DCHECK(index < size_);
     return pages_[index / kPageSize][index % kPageSize];
   }
+  /// A hint that the element will be read soon.
+  void prefetch(std::size_t index) const {
+    const char* const at = reinterpret_cast<const char*>(&(*this)[index]);
+    for (std::size_t line = 0; line < sizeof(T); line += 64) __builtin_prefetch(at + line);
+  }
   const T& front() const { return (*this)[0]; }
   const T& back() const { return (*this)[size_ - 1]; }
   const_iterator begin() const { return {this, 0}; }
