@@ -1,12 +1,10 @@
 #include "engine/base/digest.hpp"
 
-#include <bit>
-#include <cmath>
 #include <cstring>
+#include <utility>
 
 #include <xxhash.h>
 
-#include "engine/base/check.hpp"
 
 namespace colony {
 
@@ -39,34 +37,17 @@ std::optional<Digest> Digest::from_hex(std::string_view text) {
   return digest;
 }
 
-void CanonicalBytes::add_u32(std::uint32_t value) {
-  for (int i = 0; i < 4; ++i) bytes_.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
+void CanonicalBytes::grow() {
+  std::vector<std::uint8_t> larger(2 * capacity_);
+  std::memcpy(larger.data(), data(), size_);
+  heap_ = std::move(larger);
+  capacity_ = heap_.size();
 }
 
-void CanonicalBytes::add_u64(std::uint64_t value) {
-  for (int i = 0; i < 8; ++i) bytes_.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
-}
-
-void CanonicalBytes::add_double(double value) {
-  const std::uint64_t bits = std::bit_cast<std::uint64_t>(value);
-  CHECK(std::isfinite(value) && bits != 0x8000000000000000ULL);
-  add_u64(bits);
-}
-
-void CanonicalBytes::add_vec3(const Vec3& value) {
-  for (int i = 0; i < 3; ++i) add_double(value[i]);
-}
-
-void CanonicalBytes::add_optional(const std::optional<double>& value) {
-  add_u8(value ? 1 : 0);
-  if (value) add_double(*value);
-}
-
-Digest chain(const Digest& previous, const CanonicalBytes& event) {
-  std::vector<std::uint8_t> link(previous.bytes.begin(), previous.bytes.end());
-  link.insert(link.end(), event.bytes().begin(), event.bytes().end());
+Digest chain(const Digest& previous, CanonicalBytes&& event) {
+  std::memcpy(event.data(), previous.bytes.data(), CanonicalBytes::kLinkBytes);
   XXH128_canonical_t canonical;
-  XXH128_canonicalFromHash(&canonical, XXH3_128bits(link.data(), link.size()));
+  XXH128_canonicalFromHash(&canonical, XXH3_128bits(event.data(), event.size_));
   Digest digest;
   std::memcpy(digest.bytes.data(), canonical.digest, digest.bytes.size());
   return digest;

@@ -120,8 +120,9 @@ class Scorer {
     for (std::size_t k = 0; k < 2; ++k) {
       ws_.near.clear();
       ws_.near.push_back(&bodies[1 - k]);
+      const Box own = bodies[k].box();
       for (const Workspace::Neighbour& other : ws_.by_gap) {
-        if (meets(other.body->box(), bodies[k].box())) ws_.near.push_back(other.body);
+        if (meets(other.body->box(), own)) ws_.near.push_back(other.body);
       }
       count_overlaps(bodies[k], ws_.near, params_.dish.radius_um, ws_.final_points, ws_.overlap, ws_.counts);
       fitness = std::min(fitness, ws_.counts.fitness());

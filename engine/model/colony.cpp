@@ -1,6 +1,7 @@
 #include "engine/model/colony.hpp"
 
 #include <algorithm>
+#include <cstddef>
 
 #include "engine/base/check.hpp"
 
@@ -22,7 +23,15 @@ const Body& Colony::body(CellId id) const {
 
 void Colony::cells_meeting(const Box& box, std::vector<CellId>& out) const {
   grid_.candidates(box, out);
-  std::erase_if(out, [&](CellId id) { return !meets(bodies_[id.value - 1].box(), box); });
+  // Far apart in memory, all of them: fetched ahead, they come at once instead of one after the other.
+  constexpr std::size_t kAhead = 8;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    if (i + kAhead < out.size()) bodies_.prefetch(out[i + kAhead].value - 1);
+    if (meets(bodies_[out[i].value - 1].box(), box)) out[count++] = out[i];
+  }
+  out.resize(count);
+  std::sort(out.begin(), out.end());  // ids differ: one order only
 }
 
 void Colony::set_activity(Cell& cell, Activity activity) {

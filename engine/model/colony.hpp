@@ -3,12 +3,13 @@
 // Errors:  apply CHECKs that the event fits (dense seq, time not before the last, known subject, digest chain).
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
-#include <span>
 #include <vector>
 
 #include "engine/base/digest.hpp"
+#include "engine/base/paged.hpp"
 #include "engine/model/cell.hpp"
 #include "engine/model/event.hpp"
 #include "engine/model/params.hpp"
@@ -29,9 +30,9 @@ class Colony {
   void apply(const Event& event);
 
   /// All cells by ascending id: cells()[i].id.value == i + 1.
-  std::span<const Cell> cells() const { return cells_; }
+  const Paged<Cell>& cells() const { return cells_; }
   const Cell& cell(CellId id) const;
-  /// The cell's noisy ellipsoid, prepared for evaluation.
+  /// The cell's noisy ellipsoid, prepared for evaluation. As with cell(): the same object until the next apply.
   const Body& body(CellId id) const;
   bool contains(CellId id) const { return id.value >= 1 && id.value <= cells_.size(); }
 
@@ -44,6 +45,8 @@ class Colony {
   const std::optional<Finished>& finished() const { return finished_; }
   std::uint64_t count(Activity activity) const { return counts_[static_cast<int>(activity)]; }
   const NoiseParams& noise() const { return noise_; }
+  /// All heap that it holds: about 470 bytes a cell (engine/DESIGN.md).
+  std::size_t memory_bytes() const { return cells_.memory_bytes() + bodies_.memory_bytes() + grid_.memory_bytes(); }
 
  private:
   void put(const Cell& cell);                  // adds or replaces, keeping grid, bodies and counts in step
@@ -51,8 +54,8 @@ class Colony {
   void wake(const std::vector<Woken>& woken);
 
   NoiseParams noise_;                          // fixed after construction
-  std::vector<Cell> cells_;
-  std::vector<Body> bodies_;
+  Paged<Cell> cells_;
+  Paged<Body> bodies_;
   Grid grid_;
   std::uint64_t counts_[3] = {0, 0, 0};
   std::uint64_t last_seq_ = 0;

@@ -1,6 +1,7 @@
 #include "engine/model/event.hpp"
 
 #include <cmath>
+#include <utility>
 
 #include "engine/base/check.hpp"
 
@@ -28,6 +29,10 @@ void each_double(Vec3& v, F&& f) {
 }
 template <class F>
 void each_double(std::optional<double>& v, F&& f) {
+  if (v) f(*v);
+}
+template <class F>
+void each_double(SlimOptional<double>& v, F&& f) {
   if (v) f(*v);
 }
 template <class F>
@@ -180,7 +185,7 @@ Digest digest_after(const Digest& previous, const Event& event) {
   out.add_double(event.time_h);
   out.add_u32(event.cell_id ? event.cell_id->value : 0);
   std::visit(AddBody{out}, event.body);
-  return chain(previous, out);
+  return chain(previous, std::move(out));
 }
 
 }  // namespace colony

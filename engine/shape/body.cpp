@@ -13,10 +13,6 @@ bool finite(const Vec3& v) { return std::isfinite(v.x()) && std::isfinite(v.y())
 
 }  // namespace
 
-Box intersection(const Box& a, const Box& b) { return {a.low.cwiseMax(b.low), a.high.cwiseMin(b.high)}; }
-
-bool meets(const Box& a, const Box& b) { return !intersection(a, b).empty(); }
-
 Mat3 rotation_matrix(const Vec3& rotation_rad) {
   const double angle = std::sqrt(rotation_rad.squaredNorm());
   if (angle == 0.0) return Mat3::Identity();
@@ -73,11 +69,6 @@ double gardner_noise(double u, double v, double w, const NoiseParams& p) {
   return gx * gy * gz;
 }
 
-double noise_bound(const NoiseParams& noise) {
-  // |G| <= a (1 + 1/1.17) on each axis, so the product is at most (1 + 1/1.17)^3 a^3 = 6.3796 a^3, rounded up.
-  return 6.380 * noise.amplitude * noise.amplitude * noise.amplitude;
-}
-
 double noise_period(const NoiseParams& params) { return 54.0 * maths::kPi / params.frequency; }
 
 Body::Body(const BodyGeometry& geometry, const NoiseParams& noise)
@@ -85,7 +76,7 @@ Body::Body(const BodyGeometry& geometry, const NoiseParams& noise)
       semiaxes_(geometry.semiaxes_um),
       noise_offset_(geometry.noise_offset),
       noise_(noise),
-      noise_bound_(colony::noise_bound(noise)) {
+      noisy_scale_(std::sqrt(1.0 + colony::noise_bound(noise))) {
   CHECK(finite(centre_) && finite(semiaxes_) && finite(geometry.rotation_rad) && finite(noise_offset_));
   CHECK(semiaxes_.x() > 0.0 && semiaxes_.y() > 0.0 && semiaxes_.z() > 0.0);
   const Mat3 axes = rotation_matrix(geometry.rotation_rad);  // columns: the cell's axes in the dish's frame
@@ -94,14 +85,7 @@ Body::Body(const BodyGeometry& geometry, const NoiseParams& noise)
   // Covariance-like form S = R diag(s^2) R^T: half extents are the roots of its diagonal, its upper 2x2 block is the shadow's.
   Mat3 form = Mat3::Zero();
   for (int i = 0; i < 3; ++i) form += (semiaxes_[i] * semiaxes_[i]) * (axes.col(i) * axes.col(i).transpose());
-  noisy_scale_ = std::sqrt(1.0 + noise_bound_);
-  for (int i = 0; i < 3; ++i) {
-    const double half = noisy_scale_ * std::sqrt(form(i, i));
-    box_.low[i] = centre_[i] - half;
-    box_.high[i] = centre_[i] + half;
-  }
-  box_.low.z() = std::max(box_.low.z(), 0.0);
-  box_.high.z() = std::max(box_.high.z(), 0.0);
+  for (int i = 0; i < 3; ++i) half_extent_um_[i] = noisy_scale_ * std::sqrt(form(i, i));
   const double determinant = form(0, 0) * form(1, 1) - form(0, 1) * form(0, 1);
   footprint_xx_ = form(1, 1) / determinant;
   footprint_xy_ = -form(0, 1) / determinant;
@@ -119,8 +103,9 @@ double Body::field(const Vec3& point_um) const {
 bool Body::contains(const Vec3& point_um) const {
   if (!(point_um.z() >= 0.0)) return false;
   const double smooth = smooth_field(point_um);
-  if (smooth > noise_bound_) return true;
-  if (!(smooth >= -noise_bound_)) return false;
+  const double bound = noise_bound();
+  if (smooth > bound) return true;
+  if (!(smooth >= -bound)) return false;
   return field(point_um) >= 0.0;
 }
 

@@ -23,8 +23,14 @@ struct Box {
 };
 
 /// The part common to both (possibly empty).
-Box intersection(const Box& a, const Box& b);
-bool meets(const Box& a, const Box& b);
+inline Box intersection(const Box& a, const Box& b) { return {a.low.cwiseMax(b.low), a.high.cwiseMin(b.high)}; }
+/// Whether it is not empty. Axis by axis: of two bodies' boxes, computed as they are asked for, mostly one axis decides.
+inline bool meets(const Box& a, const Box& b) {
+  for (int i = 0; i < 3; ++i) {
+    if (!(a.low[i] < b.high[i] && b.low[i] < a.high[i] && a.low[i] < a.high[i] && b.low[i] < b.high[i])) return false;
+  }
+  return true;
+}
 
 /// Geometry of a body, as stored in a cell.
 struct BodyGeometry {
@@ -39,6 +45,7 @@ Mat3 rotation_matrix(const Vec3& rotation_rad);
 /// The rotation vector of a rotation matrix; angle in [0, pi].
 Vec3 rotation_vector(const Mat3& rotation);
 
+/// A colony keeps one for each cell, so what costs little is computed when asked for: the box, the bound.
 class Body {
  public:
   Body() = default;
@@ -51,7 +58,12 @@ class Body {
   /// f >= 0 and z >= 0 at p, without the noise where its bound allows.
   bool contains(const Vec3& point_um) const;
   /// Bounding box of the noisy body above the dish: semiaxes times sqrt(1 + bound), rotated, clipped at z >= 0.
-  const Box& box() const { return box_; }
+  Box box() const {
+    Box box{centre_ - half_extent_um_, centre_ + half_extent_um_};
+    box.low.z() = box.low.z() < 0.0 ? 0.0 : box.low.z();
+    box.high.z() = box.high.z() < 0.0 ? 0.0 : box.high.z();
+    return box;
+  }
   /// Half extent of the noise-free ellipsoid along a unit vector, um.
   double half_width_um(const Vec3& unit) const;
   /// True if (x, y) lies in the vertical projection of the noise-free ellipsoid.
@@ -66,7 +78,7 @@ class Body {
   const Mat3& to_unit() const { return to_unit_; }
   const Vec3& noise_offset() const { return noise_offset_; }
   const NoiseParams& noise() const { return noise_; }
-  double noise_bound() const { return noise_bound_; }
+  double noise_bound() const;
   double noisy_scale() const { return noisy_scale_; }
 
  private:
@@ -75,14 +87,14 @@ class Body {
   Mat3 to_unit_ = Mat3::Identity();
   Vec3 noise_offset_ = Vec3::Zero();
   NoiseParams noise_;
-  double noise_bound_ = 0.0;
   double noisy_scale_ = 1.0;                   // sqrt(1 + bound): the noisy body lies inside the ellipsoid scaled by this
-  Box box_;
+  Vec3 half_extent_um_ = Vec3::Zero();         // of the noisy body's box, not clipped
   double footprint_xx_ = 1.0, footprint_xy_ = 0.0, footprint_yy_ = 1.0;  // inverse of the shadow's 2x2 form
 };
 
-/// |noise| <= this, 6.380 a^3.
-double noise_bound(const NoiseParams& noise);
+/// |noise| <= this: |G| <= a (1 + 1/1.17) on each axis, so the product is at most (1 + 1/1.17)^3 a^3 = 6.3796 a^3, rounded up.
+inline double noise_bound(const NoiseParams& noise) { return 6.380 * noise.amplitude * noise.amplitude * noise.amplitude; }
+inline double Body::noise_bound() const { return colony::noise_bound(noise_); }
 
 /// True if a plane across the line of centres separates the two noisy bodies: then they share no point. (False proves nothing.)
 bool separated(const Body& a, const Body& b);

@@ -81,7 +81,7 @@ std::optional<Event> Simulator::step() {
   if (const std::optional<FinishReason> reason = reason_to_finish()) return finish(*reason);
 
   if (next_ == window_.size()) {
-    window_ = agenda_.due_before(agenda_.first().due_h + spec_.params.window_h);
+    agenda_.due_before(agenda_.first().due_h + spec_.params.window_h, window_);
     next_ = 0;
   }
   const AgendaItem item = window_[next_];

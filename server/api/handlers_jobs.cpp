@@ -27,7 +27,7 @@ Result<std::string> idempotency_key(const http::Request& request) {
 std::string hash_of(const std::string& body) {
   CanonicalBytes bytes;
   for (const char c : body) bytes.add_u8(static_cast<std::uint8_t>(c));
-  return chain(Digest{}, bytes).hex();
+  return chain(Digest{}, std::move(bytes)).hex();
 }
 
 std::string percent_encoded(std::string_view text) {

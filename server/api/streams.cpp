@@ -93,7 +93,7 @@ http::BodySource::Pull EventListSource::pull(std::string& out) {
 }
 
 http::BodySource::Pull CellListSource::pull(std::string& out) {
-  const std::span<const Cell> cells = at_.colony->cells();
+  const Paged<Cell>& cells = at_.colony->cells();
   if (next_ == 0) out += format_.head;
   for (; next_ < cells.size() && out.size() < kPieceBytes; ++next_) {
     if (next_ > 0) out += format_.separator;

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cmath>
 #include <cstdio>
+#include <optional>
 #include <thread>
 #include <vector>
 
@@ -85,8 +86,9 @@ Figures grow(Seed seed, std::uint64_t cells) {
   std::vector<Sample> samples;
   double next_sample_h = 0.0, searches = 0.0, divisions = 0.0;
   while (true) {
-    const AgendaItem* first = simulator.agenda().empty() ? nullptr : &simulator.agenda().first();
-    while (first != nullptr && first->due_h > next_sample_h) {  // values after the last event <= the sample's time
+    std::optional<AgendaItem> first;
+    if (!simulator.agenda().empty()) first = simulator.agenda().first();
+    while (first && first->due_h > next_sample_h) {  // values after the last event <= the sample's time
       samples.push_back({next_sample_h, measure_series(simulator.colony(), next_sample_h)});
       next_sample_h += 4.0;
     }
