@@ -30,13 +30,12 @@ void Agenda::follow(const Event& event, const Colony& colony) {
   for (const Woken& one : *woken) refresh(colony.cell(one.cell_id));
 }
 
-std::vector<AgendaItem> Agenda::due_before(double end_h) const {
-  std::vector<AgendaItem> due;
+void Agenda::due_before(double end_h, std::vector<AgendaItem>& out) const {
+  out.clear();
   for (const AgendaItem& item : items_) {
     if (!(item.due_h < end_h)) break;
-    due.push_back(item);
+    out.push_back(item);
   }
-  return due;
 }
 
 }  // namespace colony

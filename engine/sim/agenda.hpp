@@ -31,8 +31,8 @@ class Agenda {
   void follow(const Event& event, const Colony& colony);
   bool empty() const { return items_.empty(); }
   const AgendaItem& first() const { return *items_.begin(); }
-  /// All items due before `end_h`, in serial order.
-  std::vector<AgendaItem> due_before(double end_h) const;
+  /// All items due before `end_h`, in serial order, into `out` (cleared first).
+  void due_before(double end_h, std::vector<AgendaItem>& out) const;
   const std::set<AgendaItem>& items() const { return items_; }
 
  private:

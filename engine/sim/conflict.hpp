@@ -1,0 +1,105 @@
+// conflict: what an event can read and write, as squares in the plane, known before it is decided.
+// Method:  two events conflict when what the earlier writes can meet what the later reads; the later one then waits until the
+//          earlier is applied. Only x and y count: a bound in the plane holds for one layer as for several, where reach and free
+//          share are balls inside the same squares.
+// Units:   um.
+// Threads: pure.
+// Source:  the model of the paper, section 5; the proof is in conflict.cpp, beside the numbers it is about.
+#pragma once
+
+#include <limits>
+#include <vector>
+
+#include "engine/base/types.hpp"
+#include "engine/model/colony.hpp"
+#include "engine/model/event.hpp"
+#include "engine/model/params.hpp"
+#include "engine/sim/agenda.hpp"
+
+namespace colony {
+
+/// Axis-parallel, closed; empty unless set.
+struct Rect {
+  Vec2 low = Vec2::Constant(std::numeric_limits<double>::infinity());
+  Vec2 high = Vec2::Constant(-std::numeric_limits<double>::infinity());
+  bool empty() const { return !(low.x() <= high.x() && low.y() <= high.y()); }
+};
+bool meets(const Rect& a, const Rect& b);      // an empty one meets nothing
+bool contains(const Rect& outer, const Rect& inner);
+Rect hull(const Rect& a, const Rect& b);
+Rect grown(const Rect& rect, double by_um);    // an empty one stays empty
+Rect rect_of(const Box& box);
+Rect rect_of(const Vec3& point_um);
+
+/// Where an event changes something that a decision about another cell may read.
+struct Writes {
+  CellId cell_id;                              // the subject: all about it is written
+  Rect bodies;                                 // holds the boxes of all bodies that appear or go
+  Rect sleepers;                               // holds the centres of all cells that fall asleep or are woken
+};
+/// What a decision depends on, beside everything about its subject.
+struct Reads {
+  CellId cell_id;
+  Rect bodies;                                 // bodies whose box does not meet it do not matter
+  Rect sleepers;                               // whether a cell sleeps, and its recorded share, does not matter with its centre outside
+};
+
+/// Whether `later`, decided on the colony without `earlier`, could come out differently.
+inline bool conflicts(const Writes& earlier, const Reads& later) {
+  return earlier.cell_id == later.cell_id || meets(earlier.bodies, later.bodies) || meets(earlier.sleepers, later.sleepers);
+}
+
+class ConflictBounds {
+ public:
+  /// `scale` is for tests: below 1 the bounds are wrong on purpose (all squares shrink about the cell's centre).
+  explicit ConflictBounds(const Params& params, double scale = 1.0);
+
+  /// What handling `item` can write, whatever the decision. `colony`: as it is before any event that conflicts with the item.
+  Writes writes(const Colony& colony, const AgendaItem& item) const;
+  Reads reads(const Colony& colony, const AgendaItem& item) const;
+  /// What it writes now that it is decided: inside writes().
+  Writes writes(const Colony& colony, const AgendaItem& item, const EventBody& decided) const;
+
+  /// No rectangle above is wider or higher.
+  double side_max_um() const { return side_max_um_; }
+
+ private:
+  Rect change(const Colony& colony, const AgendaItem& item) const;
+  Rect scaled(const Rect& rect, const Vec3& about_um) const;
+
+  // Fixed after construction; um.
+  NoiseParams noise_;
+  double scale_;
+  double reach_um_;                            // of a division, about the nucleus
+  double step_um_;                             // of a move, about the box
+  double free_radius_um_;
+  double pad_um_;                              // bodies are read up to twice this beyond the change
+  double side_max_um_;
+};
+
+/// Which of a growing set of writes conflict with given reads. Rectangles are listed under the coarse squares they touch, so a
+/// question costs what is near, not what there is.
+class ConflictIndex {
+ public:
+  /// `square_um`: at least the side of any rectangle, so that each touches at most four squares.
+  explicit ConflictIndex(double square_um);
+  void clear();
+  /// `centre_um`: of the subject; a later item of the same cell is found by it, also where nothing else is written.
+  void add(const Writes& writes, const Vec3& centre_um);
+  bool conflicts(const Reads& reads) const;
+
+ private:
+  struct Entry {
+    std::int32_t writes = 0;                   // index into writes_
+    std::int32_t next = -1;                    // of the same bucket
+  };
+  template <class Visit>
+  void visit_squares(const Rect& rect, Visit&& visit) const;
+
+  double square_um_;
+  std::vector<std::int32_t> buckets_;          // head entry or -1. Two squares may share one: rectangles are compared anyway
+  std::vector<Entry> entries_;
+  std::vector<Writes> writes_;
+};
+
+}  // namespace colony
