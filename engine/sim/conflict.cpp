@@ -154,19 +154,20 @@ void ConflictIndex::visit_squares(const Rect& rect, Visit&& visit) const {
 }
 
 void ConflictIndex::add(const Writes& writes, const Vec3& centre_um) {
-  const auto index = static_cast<std::int32_t>(writes_.size());
+  const auto position = static_cast<std::int32_t>(writes_.size());
   writes_.push_back(writes);
   visit_squares(hull(hull(writes.bodies, writes.sleepers), rect_of(centre_um)), [&](std::size_t bucket) {
-    entries_.push_back({index, buckets_[bucket]});
+    entries_.push_back({position, buckets_[bucket]});
     buckets_[bucket] = static_cast<std::int32_t>(entries_.size() - 1);
   });
 }
 
-bool ConflictIndex::conflicts(const Reads& reads) const {
-  bool found = false;
+std::optional<std::size_t> ConflictIndex::find(const Reads& reads, std::size_t end) const {
+  std::optional<std::size_t> found;
   visit_squares(hull(reads.bodies, reads.sleepers), [&](std::size_t bucket) {
     for (std::int32_t at = buckets_[bucket]; at >= 0 && !found; at = entries_[static_cast<std::size_t>(at)].next) {
-      found = colony::conflicts(writes_[static_cast<std::size_t>(entries_[static_cast<std::size_t>(at)].writes)], reads);
+      const auto position = static_cast<std::size_t>(entries_[static_cast<std::size_t>(at)].position);
+      if (position < end && conflicts(writes_[position], reads)) found = position;
     }
   });
   return found;

@@ -7,7 +7,9 @@
 // Source:  the model of the paper, section 5; the proof is in conflict.cpp, beside the numbers it is about.
 #pragma once
 
+#include <cstdint>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "engine/base/types.hpp"
@@ -77,21 +79,25 @@ class ConflictBounds {
   double side_max_um_;
 };
 
-/// Which of a growing set of writes conflict with given reads. Rectangles are listed under the coarse squares they touch, so a
-/// question costs what is near, not what there is.
+/// The writes of items in serial order, to be asked which of them an item conflicts with. Rectangles are listed under the coarse
+/// squares they touch, so a question costs what is near, not what there is.
 class ConflictIndex {
  public:
   /// `square_um`: at least the side of any rectangle, so that each touches at most four squares.
   explicit ConflictIndex(double square_um);
   void clear();
-  /// `centre_um`: of the subject; a later item of the same cell is found by it, also where nothing else is written.
+  /// The writes get the positions 0, 1, 2, ... `centre_um`: of the subject; a later item of the same cell is found by it, also
+  /// where nothing else is written.
   void add(const Writes& writes, const Vec3& centre_um);
-  bool conflicts(const Reads& reads) const;
+  /// `inside`: within what was added at that position.
+  void narrow(std::size_t position, const Writes& inside) { writes_[position] = inside; }
+  /// Some position below `end` with which `reads` conflict; none if there is none.
+  std::optional<std::size_t> find(const Reads& reads, std::size_t end) const;
 
  private:
   struct Entry {
-    std::int32_t writes = 0;                   // index into writes_
-    std::int32_t next = -1;                    // of the same bucket
+    std::int32_t position = 0;
+    std::int32_t next = -1;                    // of the same bucket, lower positions
   };
   template <class Visit>
   void visit_squares(const Rect& rect, Visit&& visit) const;
@@ -99,7 +105,7 @@ class ConflictIndex {
   double square_um_;
   std::vector<std::int32_t> buckets_;          // head entry or -1. Two squares may share one: rectangles are compared anyway
   std::vector<Entry> entries_;
-  std::vector<Writes> writes_;
+  std::vector<Writes> writes_;                 // by position
 };
 
 }  // namespace colony

@@ -1,8 +1,7 @@
 #include "engine/sim/simulator.hpp"
 
-#include <algorithm>
-#include <atomic>
 #include <exception>
+#include <mutex>
 #include <string>
 #include <utility>
 
@@ -159,40 +158,50 @@ void Simulator::decide_ready() {
   // A small window follows the first item closely; a large one (a dish) is used up by half before the agenda is asked again.
   if (window_.size() < kRefillBelow) window_.refill(agenda_);
   const std::size_t count_max = kReadyPerThread * static_cast<std::size_t>(crew_.size());
-  std::vector<Window::Ready> ready = window_.find_ready(colony_, count_max, spec_.until.time_h);
-  CHECK(!ready.empty());
-  // Long ones first, so that short ones fill the gaps at the end. Those that failed before mostly fail again, after the longest
-  // search of all.
-  const auto rank = [&](const Window::Ready& one) {
-    if (one.item->kind != DueKind::kDivide) return one.item->kind == DueKind::kMove ? 2 : 3;
-    return colony_.cell(one.item->cell_id).activity == Activity::kPassive ? 0 : 1;
-  };
-  std::stable_sort(ready.begin(), ready.end(), [&](const auto& a, const auto& b) { return rank(a) < rank(b); });
+  std::mutex mutex;                            // guards window_ and stopped during the round
+  bool stopped = false;
+  const std::size_t ready_count = window_.begin_round(colony_, count_max, spec_.until.time_h);
+  CHECK(ready_count > 0);
 
   // Why the outcome cannot depend on who finished first. Each decision is a pure function of (colony, item): it reads a colony that
-  // nobody changes before the last of this round is done, and writes its own slot. And the colony it reads may lack earlier
-  // events, but only such as do not conflict with it: none of them, decided or not, writes anything that it reads (conflict.cpp).
-  // So it is the decision that the serial order would have made, and committing in serial order does the rest: later items cannot
-  // matter, and nothing new comes between (window.hpp).
-  std::atomic<bool> stopped = false;
-  crew_.run(ready.size(), [&](std::size_t index, std::size_t worker) {
-    const Window::Ready& one = ready[index];
-    auto outcome = std::make_unique<Outcome>();
-    try {
-      check_floating_point_mode();
-      outcome->decision = decide(*one.item, workspace_of(worker));
-      outcome->writes = window_.bounds().writes(colony_, *one.item, outcome->decision.body);
-    } catch (const Stopped&) {
-      stopped.store(true, std::memory_order_relaxed);
-      return;  // undecided
-    } catch (...) {
-      // Kept until its turn: which of several fails first is then the serial order's choice. Until then it writes all it may.
-      outcome->failure = std::current_exception();
-      outcome->writes = window_.bounds().writes(colony_, *one.item);
+  // nobody changes before the last of this round is done. And the colony it reads may lack earlier events, but only such as do
+  // not conflict with it: none of them, decided or not, writes anything that it reads (conflict.cpp). So it is the decision that
+  // the serial order would have made. Which items are decided in which round may differ from run to run; committing in serial
+  // order, between rounds, makes that invisible: later items cannot matter, and nothing new comes between (window.hpp).
+  crew_.run(ready_count, [&](std::size_t worker) -> std::size_t {
+    std::unique_lock lock(mutex);
+    if (stopped) return 0;
+    const std::size_t number = window_.take();
+    const AgendaItem item = window_.item(number);
+    lock.unlock();
+    std::unique_ptr<Outcome> outcome = try_to_decide(item, workspace_of(worker));
+    lock.lock();
+    if (!outcome) {
+      stopped = true;
+      return 0;
     }
-    *one.outcome = std::move(outcome);
+    const std::size_t freed_count = window_.finish(number, std::move(outcome));
+    return stopped ? 0 : freed_count;
   });
-  if (stopped.load(std::memory_order_relaxed)) throw Stopped();
+  const std::lock_guard lock(mutex);
+  if (stopped) throw Stopped();
+}
+
+// None if it was stopped.
+std::unique_ptr<Outcome> Simulator::try_to_decide(const AgendaItem& item, Workspace& workspace) const {
+  auto outcome = std::make_unique<Outcome>();
+  try {
+    check_floating_point_mode();
+    outcome->decision = decide(item, workspace);
+    outcome->writes = window_.bounds().writes(colony_, item, outcome->decision.body);
+  } catch (const Stopped&) {
+    return nullptr;
+  } catch (...) {
+    // Kept until its turn: which of several fails first is the serial order's choice. Until then it counts as writing all it may.
+    outcome->failure = std::current_exception();
+    outcome->writes = window_.bounds().writes(colony_, item);
+  }
+  return outcome;
 }
 
 }  // namespace colony

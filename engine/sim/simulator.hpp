@@ -83,6 +83,7 @@ class Simulator {
   Event commit(Event event);
   Workspace& workspace_of(std::size_t worker);
   Decision decide(const AgendaItem& item, Workspace& workspace) const;
+  std::unique_ptr<Outcome> try_to_decide(const AgendaItem& item, Workspace& workspace) const;
   void decide_ready();
 
   const RunSpec spec_;                       // fixed after construction

@@ -2,10 +2,11 @@
 // Method:  a sliding horizon: everything due before (first uncommitted due + window_h). Nothing that is committed makes anything due
 //          inside it, because every delay is at least window_h; so the list is the serial order, and only grows at its end.
 //          Decided items wait in their place until their turn.
-// Threads: exclusive; an Outcome is written by one worker while nobody else looks.
+// Threads: exclusive: during a round the caller guards every call by one mutex.
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <exception>
 #include <memory>
 #include <optional>
@@ -28,8 +29,9 @@ struct Outcome {
 /// How much looking ahead there was; no part of any result.
 struct WindowCounts {
   std::uint64_t round_count = 0;
-  std::uint64_t looked_at_count = 0;           // items, each as often as it was looked at
-  std::uint64_t ready_count = 0;               // items found ready
+  std::uint64_t looked_at_count = 0;           // items, each as often as a round looked at it
+  std::uint64_t ready_count = 0;               // items ready when a round began
+  std::uint64_t freed_count = 0;               // items that became ready during one
 };
 
 class Window {
@@ -50,15 +52,17 @@ class Window {
   std::unique_ptr<Outcome>& first_outcome() { return slots_[first_].outcome; }
   void pop() { ++first_; }
 
-  /// One that may be decided now.
-  struct Ready {
-    const AgendaItem* item;
-    std::unique_ptr<Outcome>* outcome;         // null yet
-  };
-  /// Undecided items that conflict with no uncommitted item before them, at most `count_max`, in serial order and so with the
-  /// first item if that is undecided. Looks no further than kLookAhead items, kConflictsMax conflicts or `end_h`. Valid until
-  /// the next call of anything else.
-  const std::vector<Ready>& find_ready(const Colony& colony, std::size_t count_max, std::optional<double> end_h);
+  /// A round: items are decided while the colony stands still. begin_round() looks through the horizon and returns how many items
+  /// are ready, that is undecided and in conflict with no uncommitted item before them; at most `count_max`, and the first item
+  /// if that is undecided. It looks no further than kLookAhead items, kConflictsMax conflicts or `end_h`.
+  std::size_t begin_round(const Colony& colony, std::size_t count_max, std::optional<double> end_h);
+  /// Hands out a ready item (its number in this round); one for each that begin_round() and finish() announced. In serial order,
+  /// but settlings last: they are short, nobody waits for them, and they fill the gaps at the end.
+  std::size_t take();
+  const AgendaItem& item(std::size_t number) const { return slots_[first_ + number].item; }
+  /// Keeps the outcome until its turn, and returns how many more items are ready: what a decision writes is less than what it might
+  /// have written, so some that waited for it need not wait for its commit.
+  std::size_t finish(std::size_t number, std::unique_ptr<Outcome> outcome);
 
   const ConflictBounds& bounds() const { return bounds_; }
   const WindowCounts& counts() const { return counts_; }
@@ -75,14 +79,24 @@ class Window {
     AgendaItem item;
     std::unique_ptr<Outcome> outcome;
   };
+  static constexpr std::uint32_t kNone = 0xFFFFFFFF;
+  // An item looked at in this round; its number counts from first_, and is its position in index_.
+  struct Looked {
+    Reads reads;
+    std::uint32_t waiting = kNone;             // head of the list of those that wait for this one to be decided
+    std::uint32_t next = kNone;                // of the list this one is in
+  };
+  bool settle_conflicts(std::size_t number);
+  void make_ready(std::size_t number);
 
   const double window_h_;                      // fixed after construction
   ConflictBounds bounds_;
   ConflictIndex index_;
   std::vector<Slot> slots_;                    // serial order; those before first_ are committed
   std::size_t first_ = 0;
+  std::vector<Looked> looked_;                 // by number
+  std::vector<std::uint64_t> ready_;           // heap, least first: number, plus kLast for a settling
   std::vector<AgendaItem> due_;                // scratch
-  std::vector<Ready> ready_;                   // scratch
   WindowCounts counts_;
 };
 
