@@ -2,17 +2,21 @@
 //
 // Let B be the cell's box now, c its nucleus, r its centre (in B), f = wake.free_radius_um and H the largest half extent of a body.
 //
-// The change W of an event: a rectangle that holds every box that appears or goes.
+// The change W of an event decided now: a rectangle that holds every box that appears or goes.
 //   division   W = hull(B, square of half side search_reach_um about c): candidates are placed about the pivot c, and the reach is
 //              derived from the parameter ranges to hold each with its noise box; the parent's box B goes.
 //   move       W = B grown by motility.step_um: the body keeps its shape.
 //   settling   nothing: only the subject's own nucleus and membrane point, which nobody else reads.
+// An undecided item may have others of its own cell before it in the horizon, which change c and B. So what it may write later is
+// bounded by W', the same with "a point of B" for c while a settling is due (the nucleus comes to rest among points of B), and with
+// B grown by step_um while a move is (one at most: a move's delay is not shorter than the window). After a division of the
+// cell itself nothing that was due for it is left.
 //
 // What is written, of all that decisions about other cells read:
-//   bodies     inside W.
+//   bodies     inside W'.
 //   sleepers   (a cell is one if it is passive without due_h; its recorded share counts as part of that.) Only sleepers with their
-//              centre within f of a changed box are woken: inside W grown by f. The subject itself may fall asleep (inhibited
-//              without due_h): r is inside W. No other change is visible: a cell with something due to divide is no sleeper
+//              centre within f of a changed box are woken: inside W' grown by f. The subject itself may fall asleep (inhibited
+//              without due_h): r is inside W'. No other change is visible: a cell with something due to divide is no sleeper
 //              before its attempt, and an active, senescent or retrying one is none after it.
 //
 // What is read, beside the subject's own state (same cell: always a conflict):
@@ -27,7 +31,7 @@
 // (settle_due_h <= due_h), so it is no sleeper.
 //
 // Hence with p = max(f, H if neighbours are asked what they retain):
-//   writes: bodies W, sleepers W + f.     reads: bodies W + 2 p, sleepers W + f.
+//   writes: bodies W', sleepers W' + f.     reads: bodies W + 2 p, sleepers W + f.
 // Divided, Senesced, ...: what is not listed (ids, seq, digest, time) is given at the commit or fixed by the agenda.
 #include "engine/sim/conflict.hpp"
 
@@ -42,8 +46,6 @@ namespace {
 constexpr double kSlack_um = 1e-3;
 constexpr std::size_t kBuckets = 4096;
 constexpr double kFarthest_um = 2e9;           // the grid holds coordinates to 1e9
-
-Rect square_about(const Vec3& point_um, double half_side_um) { return grown(rect_of(point_um), half_side_um); }
 
 }  // namespace
 
@@ -74,7 +76,7 @@ ConflictBounds::ConflictBounds(const Params& params, double scale)
   const double half_extent_um = body_half_extent_max_um(params);
   pad_um_ = params.contact.neighbour_retained_min > 0.0 ? std::max(free_radius_um_, half_extent_um) : free_radius_um_;
   // c and r lie in B, whose sides are at most 2 H.
-  side_max_um_ = 2.0 * (std::max(reach_um_, step_um_) + 2.0 * half_extent_um + 2.0 * pad_um_ + 4.0 * kSlack_um);
+  side_max_um_ = 2.0 * (reach_um_ + step_um_ + 2.0 * half_extent_um + 2.0 * pad_um_ + 4.0 * kSlack_um);
 }
 
 Rect ConflictBounds::scaled(const Rect& rect, const Vec3& about_um) const {
@@ -83,18 +85,21 @@ Rect ConflictBounds::scaled(const Rect& rect, const Vec3& about_um) const {
   return {about + scale_ * (rect.low - about), about + scale_ * (rect.high - about)};
 }
 
-Rect ConflictBounds::change(const Colony& colony, const AgendaItem& item) const {
+Rect ConflictBounds::change_now(const Colony& colony, const AgendaItem& item) const {
+  if (item.kind == DueKind::kSettle) return {};
   const Rect body = rect_of(colony.body(item.cell_id).box());
-  switch (item.kind) {
-    case DueKind::kSettle: return {};
-    case DueKind::kMove: return grown(body, step_um_ + kSlack_um);
-    case DueKind::kDivide: return grown(hull(body, square_about(colony.cell(item.cell_id).nucleus_um, reach_um_)), kSlack_um);
-  }
-  CHECK(false && "no such kind");
+  if (item.kind == DueKind::kMove) return grown(body, step_um_ + kSlack_um);
+  return grown(hull(body, grown(rect_of(colony.cell(item.cell_id).nucleus_um), reach_um_)), kSlack_um);
+}
+
+Rect ConflictBounds::change_later(const Colony& colony, const AgendaItem& item) const {
+  const Cell& cell = colony.cell(item.cell_id);
+  if (item.kind != DueKind::kDivide || (!cell.settle_due_h && !cell.move_due_h)) return change_now(colony, item);
+  return grown(rect_of(colony.body(item.cell_id).box()), reach_um_ + (cell.move_due_h ? step_um_ : 0.0) + kSlack_um);
 }
 
 Writes ConflictBounds::writes(const Colony& colony, const AgendaItem& item) const {
-  const Rect change_um = change(colony, item);
+  const Rect change_um = change_later(colony, item);
   const Vec3& centre_um = colony.cell(item.cell_id).centre_um;
   return {item.cell_id, scaled(change_um, centre_um), scaled(grown(change_um, free_radius_um_ + kSlack_um), centre_um)};
 }
@@ -104,7 +109,7 @@ Reads ConflictBounds::reads(const Colony& colony, const AgendaItem& item) const 
   if (item.kind == DueKind::kSettle) {
     return {item.cell_id, scaled(grown(rect_of(colony.body(item.cell_id).box()), kSlack_um), centre_um), {}};
   }
-  const Rect change_um = change(colony, item);
+  const Rect change_um = change_now(colony, item);
   return {item.cell_id, scaled(grown(change_um, 2.0 * (pad_um_ + kSlack_um)), centre_um),
           scaled(grown(change_um, free_radius_um_ + kSlack_um), centre_um)};
 }
@@ -133,17 +138,18 @@ Writes ConflictBounds::writes(const Colony& colony, const AgendaItem& item, cons
   return out;
 }
 
-ConflictIndex::ConflictIndex(double square_um) : square_um_(square_um), buckets_(kBuckets, -1) { CHECK(square_um > 0.0); }
+ConflictIndex::ConflictIndex(double square_um, std::size_t capacity)
+    : square_um_(square_um), capacity_(capacity), buckets_(kBuckets, -1) {
+  CHECK(square_um > 0.0 && capacity > 0 && (capacity & (capacity - 1)) == 0);
+}
 
 void ConflictIndex::clear() {
   std::fill(buckets_.begin(), buckets_.end(), -1);
   entries_.clear();
-  writes_.clear();
 }
 
 template <class Visit>
 void ConflictIndex::visit_squares(const Rect& rect, Visit&& visit) const {
-  if (rect.empty()) return;
   const auto column = [&](double at_um) { return static_cast<std::int64_t>((at_um + kFarthest_um) / square_um_); };
   for (std::int64_t x = column(rect.low.x()); x <= column(rect.high.x()); ++x) {
     for (std::int64_t y = column(rect.low.y()); y <= column(rect.high.y()); ++y) {
@@ -153,21 +159,31 @@ void ConflictIndex::visit_squares(const Rect& rect, Visit&& visit) const {
   }
 }
 
-void ConflictIndex::add(const Writes& writes, const Vec3& centre_um) {
-  const auto position = static_cast<std::int32_t>(writes_.size());
-  writes_.push_back(writes);
-  visit_squares(hull(hull(writes.bodies, writes.sleepers), rect_of(centre_um)), [&](std::size_t bucket) {
-    entries_.push_back({position, buckets_[bucket]});
+void ConflictIndex::list(std::uint64_t number) {
+  visit_squares(place(number).listed, [&](std::size_t bucket) {
+    entries_.push_back({number, buckets_[bucket]});
     buckets_[bucket] = static_cast<std::int32_t>(entries_.size() - 1);
   });
 }
 
-std::optional<std::size_t> ConflictIndex::find(const Reads& reads, std::size_t end) const {
-  std::optional<std::size_t> found;
+void ConflictIndex::add(std::uint64_t number, std::uint64_t first, const Writes& writes, const Vec3& centre_um) {
+  CHECK(number >= first && number - first < capacity_);
+  places_.resize(capacity_);
+  if (entries_.size() > 4 * capacity_) {  // mostly committed ones
+    clear();
+    for (std::uint64_t one = first; one < number; ++one) list(one);
+  }
+  place(number) = {writes, hull(hull(writes.bodies, writes.sleepers), rect_of(centre_um))};
+  list(number);
+}
+
+std::optional<std::uint64_t> ConflictIndex::find(const Reads& reads, std::uint64_t first, std::uint64_t end) const {
+  std::optional<std::uint64_t> found;
   visit_squares(hull(reads.bodies, reads.sleepers), [&](std::size_t bucket) {
     for (std::int32_t at = buckets_[bucket]; at >= 0 && !found; at = entries_[static_cast<std::size_t>(at)].next) {
-      const auto position = static_cast<std::size_t>(entries_[static_cast<std::size_t>(at)].position);
-      if (position < end && conflicts(writes_[position], reads)) found = position;
+      const std::uint64_t number = entries_[static_cast<std::size_t>(at)].number;
+      if (number < first) return;
+      if (number < end && conflicts(place(number).writes, reads)) found = number;
     }
   });
   return found;

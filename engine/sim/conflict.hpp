@@ -56,8 +56,10 @@ class ConflictBounds {
   /// `scale` is for tests: below 1 the bounds are wrong on purpose (all squares shrink about the cell's centre).
   explicit ConflictBounds(const Params& params, double scale = 1.0);
 
-  /// What handling `item` can write, whatever the decision. `colony`: as it is before any event that conflicts with the item.
+  /// What handling `item` can write, whatever the decision, and whatever other items of the horizon, those of the same cell among
+  /// them, do before it.
   Writes writes(const Colony& colony, const AgendaItem& item) const;
+  /// What deciding it on this colony can read.
   Reads reads(const Colony& colony, const AgendaItem& item) const;
   /// What it writes now that it is decided: inside writes().
   Writes writes(const Colony& colony, const AgendaItem& item, const EventBody& decided) const;
@@ -66,7 +68,8 @@ class ConflictBounds {
   double side_max_um() const { return side_max_um_; }
 
  private:
-  Rect change(const Colony& colony, const AgendaItem& item) const;
+  Rect change_now(const Colony& colony, const AgendaItem& item) const;
+  Rect change_later(const Colony& colony, const AgendaItem& item) const;
   Rect scaled(const Rect& rect, const Vec3& about_um) const;
 
   // Fixed after construction; um.
@@ -79,33 +82,42 @@ class ConflictBounds {
   double side_max_um_;
 };
 
-/// The writes of items in serial order, to be asked which of them an item conflicts with. Rectangles are listed under the coarse
-/// squares they touch, so a question costs what is near, not what there is.
+/// The writes of items, which have ascending numbers in serial order, to be asked which of them an item conflicts with. Rectangles are
+/// listed under the coarse squares they touch, so a question costs what is near, not what there is.
 class ConflictIndex {
  public:
-  /// `square_um`: at least the side of any rectangle, so that each touches at most four squares.
-  explicit ConflictIndex(double square_um);
+  /// `square_um`: at least the side of any rectangle, so that each touches at most four squares. `capacity`: a power of two;
+  /// more consecutive numbers than this are never alive at once.
+  ConflictIndex(double square_um, std::size_t capacity);
   void clear();
-  /// The writes get the positions 0, 1, 2, ... `centre_um`: of the subject; a later item of the same cell is found by it, also
-  /// where nothing else is written.
-  void add(const Writes& writes, const Vec3& centre_um);
-  /// `inside`: within what was added at that position.
-  void narrow(std::size_t position, const Writes& inside) { writes_[position] = inside; }
-  /// Some position below `end` with which `reads` conflict; none if there is none.
-  std::optional<std::size_t> find(const Reads& reads, std::size_t end) const;
+  /// `number`: above all before. `first`: items below it are committed and will not be found again. `centre_um`: of the subject; a
+  /// later item of the same cell is found by it, also where nothing else is written.
+  void add(std::uint64_t number, std::uint64_t first, const Writes& writes, const Vec3& centre_um);
+  /// `inside`: within what was added with that number.
+  void narrow(std::uint64_t number, const Writes& inside) { place(number).writes = inside; }
+  /// Some number in [first, end) with which `reads` conflict; none if there is none.
+  std::optional<std::uint64_t> find(const Reads& reads, std::uint64_t first, std::uint64_t end) const;
 
  private:
-  struct Entry {
-    std::int32_t position = 0;
-    std::int32_t next = -1;                    // of the same bucket, lower positions
+  struct Place {
+    Writes writes;
+    Rect listed;                               // it is listed under the squares of this
   };
+  struct Entry {
+    std::uint64_t number = 0;
+    std::int32_t next = -1;                    // of the same bucket; numbers descend
+  };
+  Place& place(std::uint64_t number) { return places_[number & (capacity_ - 1)]; }
+  const Place& place(std::uint64_t number) const { return places_[number & (capacity_ - 1)]; }
+  void list(std::uint64_t number);
   template <class Visit>
   void visit_squares(const Rect& rect, Visit&& visit) const;
 
   double square_um_;
+  std::size_t capacity_;
   std::vector<std::int32_t> buckets_;          // head entry or -1. Two squares may share one: rectangles are compared anyway
   std::vector<Entry> entries_;
-  std::vector<Writes> writes_;                 // by position
+  std::vector<Place> places_;                  // by number modulo capacity; nothing before the first is added: one thread needs none
 };
 
 }  // namespace colony

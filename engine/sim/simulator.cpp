@@ -103,7 +103,7 @@ std::optional<Event> Simulator::step() {
   }
   if (const std::optional<FinishReason> reason = reason_to_finish()) return finish(*reason);
 
-  if (window_.empty()) window_.refill(agenda_);
+  if (window_.empty()) window_.refill(colony_, agenda_);
   // Nothing that happens makes anything due inside the horizon: so what is in front here is first in the agenda.
   CHECK(window_.first() == agenda_.first());
   if (!window_.first_outcome()) {
@@ -118,7 +118,7 @@ std::optional<Event> Simulator::step() {
   std::unique_ptr<Outcome>& outcome = window_.first_outcome();
   if (outcome->failure) {
     const std::exception_ptr failure = outcome->failure;
-    outcome.reset();  // whoever steps again decides again
+    window_.clear();  // whoever steps again decides again
     rethrow_here(failure);
   }
   Event event;
@@ -126,11 +126,15 @@ std::optional<Event> Simulator::step() {
   event.cell_id = window_.first().cell_id;
   event.body = std::move(outcome->decision.body);
   const Work work = outcome->decision.work;
-  outcome.reset();
-  Event committed = commit(std::move(event));
-  window_.pop();
-  work_ += work;
-  return committed;
+  try {
+    Event committed = commit(std::move(event));
+    window_.pop(colony_);
+    work_ += work;
+    return committed;
+  } catch (...) {
+    window_.clear();
+    throw;
+  }
 }
 
 Workspace& Simulator::workspace_of(std::size_t worker) {
@@ -156,9 +160,9 @@ Decision Simulator::decide(const AgendaItem& item, Workspace& workspace) const {
 
 void Simulator::decide_ready() {
   // A small window follows the first item closely; a large one (a dish) is used up by half before the agenda is asked again.
-  if (window_.size() < kRefillBelow) window_.refill(agenda_);
+  if (window_.size() < kRefillBelow) window_.refill(colony_, agenda_);
   const std::size_t count_max = kReadyPerThread * static_cast<std::size_t>(crew_.size());
-  std::mutex mutex;                            // guards window_ and stopped during the round
+  std::mutex mutex;  // guards window_ and stopped during the round
   bool stopped = false;
   const std::size_t ready_count = window_.begin_round(colony_, count_max, spec_.until.time_h);
   CHECK(ready_count > 0);
@@ -171,16 +175,17 @@ void Simulator::decide_ready() {
   crew_.run(ready_count, [&](std::size_t worker) -> std::size_t {
     std::unique_lock lock(mutex);
     if (stopped) return 0;
-    const std::size_t number = window_.take();
+    const Window::Number number = window_.take();
     const AgendaItem item = window_.item(number);
     lock.unlock();
     std::unique_ptr<Outcome> outcome = try_to_decide(item, workspace_of(worker));
     lock.lock();
     if (!outcome) {
       stopped = true;
+      window_.give_back(number);
       return 0;
     }
-    const std::size_t freed_count = window_.finish(number, std::move(outcome));
+    const std::size_t freed_count = window_.finish(colony_, number, std::move(outcome));
     return stopped ? 0 : freed_count;
   });
   const std::lock_guard lock(mutex);
