@@ -1,5 +1,8 @@
 #include "engine/sim/crew.hpp"
 
+#include <algorithm>
+
+#include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 #include <tbb/task_group.h>
 
@@ -8,7 +11,12 @@
 namespace colony {
 
 struct Crew::Threads {
-  explicit Threads(int size) : arena(size, 1) {}
+  // Made here, not at the first use: the arena gives its threads the floating-point mode it was made under. More threads than oneTBB
+  // has would only make it complain on standard error.
+  explicit Threads(int size) : arena(std::min(size, available()), 1) { arena.initialize(); }
+  static int available() {
+    return static_cast<int>(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
+  }
   tbb::task_arena arena;
 };
 

@@ -107,6 +107,7 @@ std::optional<Event> Simulator::step() {
   // Nothing that happens makes anything due inside the horizon: so what is in front here is first in the agenda.
   CHECK(window_.first() == agenda_.first());
   if (!window_.first_outcome()) {
+    check_floating_point_mode();
     if (crew_.size() > 1) {
       decide_ready();
     } else {
