@@ -107,6 +107,10 @@ std::vector<std::pair<std::string, RunSpec>> scenes() {
   spec.params.search.distance = {0.3, 0.3};  // the reach is shorter than the dividing body
   spec.params.contact.fitness_min = 0.3;
   all.emplace_back("packed, near", spec);
+  spec = testing::spec_of(4, testing::scaled(90, 200));
+  spec.params.wake.rule = WakeRule::kAlways;
+  spec.params.wake.free_radius_um = 45.0;  // longer than the reach: waking bounds what is read and written
+  all.emplace_back("wide free radius", spec);
   return all;
 }
 
@@ -179,6 +183,88 @@ TEST(ConflictBounds, HoldWhatIsRead) {
     EXPECT_GT(turned_count, compared_count) << name;
     EXPECT_GT(differing_count, 0) << name;
   }
+}
+
+// Cells as no scene makes them: the bounds at their edge.
+class ConflictBoundsAtTheEdge : public ::testing::Test {
+ protected:
+  CellId add(double x_um, const Vec3& nucleus_offset_um, bool settles = false) {
+    Cell cell;
+    cell.id = CellId{static_cast<std::uint32_t>(colony_.cells().size() + 1)};
+    cell.semiaxes_um = Vec3(14.0, 11.0, 6.0);
+    cell.centre_um = Vec3(x_um, 0.0, 3.3);
+    cell.nucleus_um = cell.centre_um + nucleus_offset_um;
+    cell.due_h = 10.0;
+    if (settles) cell.settle_due_h = 9.5;
+    apply(cell.id, Founded{cell});
+    return cell.id;
+  }
+  void apply(CellId id, EventBody body) {
+    Event event;
+    event.seq = colony_.last_seq() + 1;
+    event.cell_id = id;
+    event.body = std::move(body);
+    event.digest = digest_after(colony_.digest(), event);
+    colony_.apply(event);
+  }
+  static AgendaItem division(CellId id) { return {10.0, DueKind::kDivide, id}; }
+  Rect box(CellId id) const { return rect_of(colony_.body(id).box()); }
+
+  Params params_;
+  Colony colony_{Params{}};
+};
+
+TEST_F(ConflictBoundsAtTheEdge, TheDividingBodyItselfGoes) {
+  params_.search.distance = {0.3, 0.3};
+  params_.search.sideways = 0.0;
+  const CellId id = add(0.0, Vec3(14.0, 0.0, 0.0));
+  const ConflictBounds bounds(params_);
+  EXPECT_FALSE(contains(grown(rect_of(colony_.cell(id).nucleus_um), search_reach_um(params_)), box(id)));  // the case is one
+  EXPECT_TRUE(contains(bounds.writes(colony_, division(id)).bodies, box(id)));
+  EXPECT_TRUE(contains(bounds.reads(colony_, division(id)).bodies, box(id)));
+}
+
+TEST_F(ConflictBoundsAtTheEdge, ASettlingBeforeTheDivisionMovesTheNucleus) {
+  const CellId id = add(0.0, Vec3(-14.0, 0.0, 0.0), true);
+  const ConflictBounds bounds(params_);
+  const Writes before = bounds.writes(colony_, division(id));
+  Settled settled;
+  settled.nucleus_um = colony_.cell(id).centre_um + Vec3(14.0, 0.0, 0.0);
+  settled.nearest_membrane_um = settled.nucleus_um;
+  settled.due_h = 10.0;
+  apply(id, settled);
+  const Writes after = bounds.writes(colony_, division(id));
+  EXPECT_TRUE(contains(before.bodies, after.bodies) && contains(before.sleepers, after.sleepers));
+}
+
+// The neighbours of the neighbours of a candidate: read where neighbours are asked what they retain.
+TEST_F(ConflictBoundsAtTheEdge, ANeighboursNeighbourIsRead) {
+  params_.wake.free_radius_um = 5.0;
+  const CellId id = add(0.0, Vec3::Zero());
+  const double half = box(id).high.x();
+  const double edge = search_reach_um(params_);
+  const CellId neighbour = add(edge + half - 0.01, Vec3::Zero());
+  const CellId next = add(edge + 3.0 * half - 0.02, Vec3::Zero());
+  ASSERT_TRUE(meets(box(neighbour), box(next)));
+  EXPECT_FALSE(meets(ConflictBounds(params_).reads(colony_, division(id)).bodies, box(next)));
+  params_.contact.neighbour_retained_min = 0.1;
+  EXPECT_TRUE(meets(ConflictBounds(params_).reads(colony_, division(id)).bodies, box(next)));
+}
+
+// A sleeper as far as one is woken, and a body as far as its share is taken.
+TEST_F(ConflictBoundsAtTheEdge, ASleeperAtTheEdgeReadsAsFarAgain) {
+  const double f = params_.wake.free_radius_um;
+  const CellId id = add(0.0, Vec3::Zero());
+  const double edge = search_reach_um(params_);
+  const CellId sleeper = add(edge + f, Vec3::Zero());
+  const CellId beyond = add(edge + 2.0 * f + box(id).high.x(), Vec3::Zero());
+  const ConflictBounds bounds(params_);
+  const Vec3& centre_um = colony_.cell(sleeper).centre_um;
+  EXPECT_TRUE(contains(bounds.writes(colony_, division(id)).sleepers, rect_of(centre_um)));
+  EXPECT_TRUE(contains(bounds.reads(colony_, division(id)).sleepers, rect_of(centre_um)));
+  EXPECT_TRUE(meets(bounds.reads(colony_, division(id)).bodies, box(beyond)));
+  EXPECT_LE(bounds.reads(colony_, division(id)).bodies.high.x() - bounds.reads(colony_, division(id)).bodies.low.x(),
+            bounds.side_max_um());
 }
 
 TEST(ConflictIndex, FindsWhatAPlainSearchFinds) {
