@@ -1,29 +1,30 @@
 // The bounds, and why they hold. Distances are Chebyshev's, in the plane; "within d of R" means inside R grown by d.
 //
-// Let B be the cell's box now, c its nucleus, r its centre (in B), f = wake.free_radius_um and H the largest half extent of a body.
+// Let B be the cell's box now, c its nucleus, r its centre (in B), f = wake.free_radius_um, H a body's largest half extent.
 //
 // The change W of an event decided now: a rectangle that holds every box that appears or goes.
-//   division   W = hull(B, square of half side search_reach_um about c): candidates are placed about the pivot c, and the reach is
-//              derived from the parameter ranges to hold each with its noise box; the parent's box B goes.
+//   division   W = hull(B, square of half side search_reach_um about c): candidates are placed about the pivot c, and the reach
+//              is derived from the parameter ranges to hold each with its noise box; the parent's box B goes.
 //   move       W = B grown by motility.step_um: the body keeps its shape.
 //   settling   nothing: only the subject's own nucleus and membrane point, which nobody else reads.
-// An undecided item may have others of its own cell before it in the horizon, which change c and B. So what it may write later is
-// bounded by W', the same with "a point of B" for c while a settling is due (the nucleus comes to rest among points of B), and with
-// B grown by step_um while a move is (one at most: a move's delay is not shorter than the window). After a division of the
-// cell itself nothing that was due for it is left.
+// An undecided division may have other items of its own cell before it in the horizon, which change c and B. So what it may
+// write later is bounded by W', the same with "a point of B" for c where a settling comes before (the nucleus comes to rest
+// among points of B) or a move does, and then with B grown by step_um (one move at most: its delay is not shorter than the
+// window). Else, and for the other kinds, W' = W. After a division nothing that was due for its cell before is left.
 //
 // What is written, of all that decisions about other cells read:
 //   bodies     inside W'.
-//   sleepers   (a cell is one if it is passive without due_h; its recorded share counts as part of that.) Only sleepers with their
-//              centre within f of a changed box are woken: inside W' grown by f. The subject itself may fall asleep (inhibited
-//              without due_h): r is inside W'. No other change is visible: a cell with something due to divide is no sleeper
-//              before its attempt, and an active, senescent or retrying one is none after it.
+//   sleepers   (a cell is one if it is passive without due_h; its recorded share counts as part of that.) Only sleepers with
+//              their centre within f of a changed box are woken: inside W' grown by f. The subject itself may fall asleep
+//              (inhibited without due_h): r is inside W'; or, asleep, move: both its centres are. No other change is visible:
+//              a cell with something due to divide is no sleeper before its attempt, and an active, senescent or retrying one
+//              is none after it.
 //
 // What is read, beside the subject's own state (same cell: always a conflict):
-//   division   bodies that meet the reach square (candidates' neighbours), B (isolation), the square of half side f about r (free
-//              share of a failed search), all within f of W; with neighbour_retained_min > 0, also those that meet a box that
-//              meets the reach square, hence within 2 H of W. For waking: sleepers with their centre within f of W, and the bodies
-//              that meet a square of half side f about such a centre: within 2 f of W.
+//   division   bodies that meet the reach square (candidates' neighbours), B (isolation), the square of half side f about r
+//              (free share of a failed search), all within f of W; with neighbour_retained_min > 0, also those that meet a box
+//              that meets the reach square, hence within 2 H of W. For waking: sleepers with their centre within f of W, and
+//              the bodies that meet a square of half side f about such a centre: within 2 f of W.
 //   move       the same but for the reach: bodies that meet the new box, or the square about r (the freer half), and waking. A
 //              sleeper that moves reads its own sleep: r is inside W.
 //   settling   bodies that meet B.
@@ -32,7 +33,7 @@
 //
 // Hence with p = max(f, H if neighbours are asked what they retain):
 //   writes: bodies W', sleepers W' + f.     reads: bodies W + 2 p, sleepers W + f.
-// Divided, Senesced, ...: what is not listed (ids, seq, digest, time) is given at the commit or fixed by the agenda.
+// What is not listed (ids, seq, digest, time) is given at the commit or fixed by the agenda.
 #include "engine/sim/conflict.hpp"
 
 #include <algorithm>
@@ -46,6 +47,8 @@ namespace {
 constexpr double kSlack_um = 1e-3;
 constexpr std::size_t kBuckets = 4096;
 constexpr double kFarthest_um = 2e9;           // the grid holds coordinates to 1e9
+
+bool is_sleeper(const Cell& cell) { return cell.activity == Activity::kPassive && !cell.due_h; }
 
 }  // namespace
 
@@ -94,8 +97,9 @@ Rect ConflictBounds::change_now(const Colony& colony, const AgendaItem& item) co
 
 Rect ConflictBounds::change_later(const Colony& colony, const AgendaItem& item) const {
   const Cell& cell = colony.cell(item.cell_id);
-  if (item.kind != DueKind::kDivide || (!cell.settle_due_h && !cell.move_due_h)) return change_now(colony, item);
-  return grown(rect_of(colony.body(item.cell_id).box()), reach_um_ + (cell.move_due_h ? step_um_ : 0.0) + kSlack_um);
+  const bool moves = cell.move_due_h && *cell.move_due_h <= item.due_h;
+  if (item.kind != DueKind::kDivide || (!cell.settle_due_h && !moves)) return change_now(colony, item);
+  return grown(rect_of(colony.body(item.cell_id).box()), reach_um_ + (moves ? step_um_ : 0.0) + kSlack_um);
 }
 
 Writes ConflictBounds::writes(const Colony& colony, const AgendaItem& item) const {
@@ -130,6 +134,9 @@ Writes ConflictBounds::writes(const Colony& colony, const AgendaItem& item, cons
     out.bodies = rect_of(colony.body(item.cell_id).box());
     replace(moved->cell);
     wake(moved->woken);
+    if (is_sleeper(colony.cell(item.cell_id))) {
+      out.sleepers = hull(out.sleepers, hull(rect_of(centre_um), rect_of(moved->cell.centre_um)));
+    }
   } else if (const auto* inhibited = std::get_if<Inhibited>(&decided)) {
     if (!inhibited->due_h) out.sleepers = rect_of(centre_um);
   }
@@ -153,7 +160,8 @@ void ConflictIndex::visit_squares(const Rect& rect, Visit&& visit) const {
   const auto column = [&](double at_um) { return static_cast<std::int64_t>((at_um + kFarthest_um) / square_um_); };
   for (std::int64_t x = column(rect.low.x()); x <= column(rect.high.x()); ++x) {
     for (std::int64_t y = column(rect.low.y()); y <= column(rect.high.y()); ++y) {
-      const auto mixed = static_cast<std::uint64_t>(x) * 0x9E3779B97F4A7C15U + static_cast<std::uint64_t>(y) * 0xC2B2AE3D27D4EB4FU;
+      const auto mixed = static_cast<std::uint64_t>(x) * 0x9E3779B97F4A7C15U +
+                         static_cast<std::uint64_t>(y) * 0xC2B2AE3D27D4EB4FU;
       visit(static_cast<std::size_t>((mixed >> 40) % kBuckets));
     }
   }

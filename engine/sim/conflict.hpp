@@ -1,7 +1,7 @@
 // conflict: what an event can read and write, as squares in the plane, known before it is decided.
-// Method:  two events conflict when what the earlier writes can meet what the later reads; the later one then waits until the
-//          earlier is applied. Only x and y count: a bound in the plane holds for one layer as for several, where reach and free
-//          share are balls inside the same squares.
+// Method:  two events conflict when what the earlier writes can meet what the later reads; the later one then waits until
+//          the earlier is applied. Only x and y count: a bound in the plane holds for one layer as for several, where reach
+//          and free share are balls inside the same squares.
 // Units:   um.
 // Threads: pure.
 // Source:  the model of the paper, section 5; the proof is in conflict.cpp, beside the numbers it is about.
@@ -43,7 +43,7 @@ struct Writes {
 struct Reads {
   CellId cell_id;
   Rect bodies;                                 // bodies whose box does not meet it do not matter
-  Rect sleepers;                               // whether a cell sleeps, and its recorded share, does not matter with its centre outside
+  Rect sleepers;                               // whether a cell sleeps does not matter with its centre outside
 };
 
 /// Whether `later`, decided on the colony without `earlier`, could come out differently.
@@ -56,8 +56,8 @@ class ConflictBounds {
   /// `scale` is for tests: below 1 the bounds are wrong on purpose (all squares shrink about the cell's centre).
   explicit ConflictBounds(const Params& params, double scale = 1.0);
 
-  /// What handling `item` can write, whatever the decision, and whatever other items of the horizon, those of the same cell among
-  /// them, do before it.
+  /// What handling `item` can write, whatever the decision, and whatever other items of the horizon, those of the same cell
+  /// among them, do before it.
   Writes writes(const Colony& colony, const AgendaItem& item) const;
   /// What deciding it on this colony can read.
   Reads reads(const Colony& colony, const AgendaItem& item) const;
@@ -82,16 +82,16 @@ class ConflictBounds {
   double side_max_um_;
 };
 
-/// The writes of items, which have ascending numbers in serial order, to be asked which of them an item conflicts with. Rectangles are
-/// listed under the coarse squares they touch, so a question costs what is near, not what there is.
+/// The writes of items, which have ascending numbers in serial order, to be asked which of them an item conflicts with.
+/// Rectangles are listed under the coarse squares they touch, so a question costs what is near, not what there is.
 class ConflictIndex {
  public:
   /// `square_um`: at least the side of any rectangle, so that each touches at most four squares. `capacity`: a power of two;
   /// more consecutive numbers than this are never alive at once.
   ConflictIndex(double square_um, std::size_t capacity);
   void clear();
-  /// `number`: above all before. `first`: items below it are committed and will not be found again. `centre_um`: of the subject; a
-  /// later item of the same cell is found by it, also where nothing else is written.
+  /// `number`: above all before. `first`: items below it are committed and will not be found again. `centre_um`: of the
+  /// subject; a later item of the same cell is found by it, also where nothing else is written.
   void add(std::uint64_t number, std::uint64_t first, const Writes& writes, const Vec3& centre_um);
   /// `inside`: within what was added with that number.
   void narrow(std::uint64_t number, const Writes& inside) { place(number).writes = inside; }
@@ -117,7 +117,7 @@ class ConflictIndex {
   std::size_t capacity_;
   std::vector<std::int32_t> buckets_;          // head entry or -1. Two squares may share one: rectangles are compared anyway
   std::vector<Entry> entries_;
-  std::vector<Place> places_;                  // by number modulo capacity; nothing before the first is added: one thread needs none
+  std::vector<Place> places_;                  // by number modulo capacity; made at the first add: one thread needs none
 };
 
 }  // namespace colony

@@ -13,15 +13,16 @@
 namespace colony {
 
 struct Crew::Threads {
-  // Made here, not at the first use: the arena gives its threads the floating-point mode it was made under. More threads than oneTBB
-  // has would only make it complain on standard error.
+  // Made here, not at the first use: the arena gives its threads the floating-point mode it was made under. More threads
+  // than oneTBB has would only make it complain on standard error.
   explicit Threads(int size) : arena(std::min(size, available()), 1) { arena.initialize(); }
   static int available() {
     return static_cast<int>(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
   }
   tbb::task_arena arena;
-  // What oneTBB promises, what was done before a task is handed over or ended is seen after, said once more in our own code: a
-  // thread sanitizer cannot look into the library, and would either complain of everything or have to overlook everything.
+  // What oneTBB promises, what was done before a task is handed over or ended is seen after, said once more in our own
+  // code: a thread sanitizer cannot look into the library, and would either complain of everything or have to overlook
+  // everything.
   std::atomic<std::uint64_t> handed_over = 0;
   void meet() { handed_over.fetch_add(1, std::memory_order_acq_rel); }
   void start(tbb::task_group& group, const std::function<void()>& chain) {
@@ -50,8 +51,8 @@ void Crew::run(std::size_t count, const std::function<std::size_t(std::size_t)>&
   Threads& threads = *threads_;
   threads.arena.execute([&] {
     tbb::task_group group;
-    // A chain of calls, and a new chain for every further call that becomes possible. Idle threads go back to the arena, where
-    // they can also be lent to what a call starts in parallel.
+    // A chain of calls, and a new chain for every further call that becomes possible. Idle threads go back to the arena,
+    // where they can also be lent to what a call starts in parallel.
     const std::function<void()> chain = [&] {
       const auto worker = static_cast<std::size_t>(tbb::this_task_arena::current_thread_index());
       for (std::size_t left = 1; left > 0; --left) {

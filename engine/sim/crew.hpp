@@ -22,9 +22,10 @@ class Crew {
 
   int size() const { return size_; }
 
-  /// Calls work(worker) `count` times, and once more for each that such a call returns; comes back when all calls have. `worker`
-  /// is in [0, size): two calls at the same time have different ones. `work` must not throw, and what it starts in parallel itself
-  /// must be isolated (tbb::this_task_arena::isolate): else a worker that waits for it could begin another call.
+  /// Calls work(worker) `count` times, and once more for each that such a call returns; comes back when all calls have.
+  /// `worker` is in [0, size): two calls at the same time have different ones. `work` must not throw, and what it starts in
+  /// parallel itself must be isolated (tbb::this_task_arena::isolate): else a worker that waits for it could begin another
+  /// call.
   void run(std::size_t count, const std::function<std::size_t(std::size_t worker)>& work);
 
  private:

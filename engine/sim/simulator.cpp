@@ -17,8 +17,9 @@ RunSpec checked(RunSpec spec) {
   return spec;
 }
 
-// Items decided in one round, per thread: enough that waiting for the last is a small part of it, few enough that little is decided
-// for nothing when the run ends, and that something is left to be decided beside the next item that everything waits for.
+// Items decided in one round, per thread: enough that waiting for the last is a small part of it, few enough that little is
+// decided for nothing when the run ends, and that something is left to be decided beside the next item that everything
+// waits for.
 constexpr std::size_t kReadyPerThread = 32;
 constexpr std::size_t kRefillBelow = Window::kLookAhead / 2;
 
@@ -168,11 +169,12 @@ void Simulator::decide_ready() {
   const std::size_t ready_count = window_.begin_round(colony_, count_max, spec_.until.time_h);
   CHECK(ready_count > 0);
 
-  // Why the outcome cannot depend on who finished first. Each decision is a pure function of (colony, item): it reads a colony that
-  // nobody changes before the last of this round is done. And the colony it reads may lack earlier events, but only such as do
-  // not conflict with it: none of them, decided or not, writes anything that it reads (conflict.cpp). So it is the decision that
-  // the serial order would have made. Which items are decided in which round may differ from run to run; committing in serial
-  // order, between rounds, makes that invisible: later items cannot matter, and nothing new comes between (window.hpp).
+  // Why the outcome cannot depend on who finished first. Each decision is a pure function of (colony, item): it reads a
+  // colony that nobody changes before the last of this round is done. And the colony it reads may lack earlier events, but
+  // only such as do not conflict with it: none of them, decided or not, writes anything that it reads (conflict.cpp). So it
+  // is the decision that the serial order would have made. Which items are decided in which round may differ from run to
+  // run; committing in serial order, between rounds, makes that invisible: later items cannot matter, and nothing new comes
+  // between (window.hpp).
   crew_.run(ready_count, [&](std::size_t worker) -> std::size_t {
     std::unique_lock lock(mutex);
     if (stopped) return 0;
@@ -203,7 +205,8 @@ std::unique_ptr<Outcome> Simulator::try_to_decide(const AgendaItem& item, Worksp
   } catch (const Stopped&) {
     return nullptr;
   } catch (...) {
-    // Kept until its turn: which of several fails first is the serial order's choice. Until then it counts as writing all it may.
+    // Kept until its turn: which of several fails first is the serial order's choice. Until then it counts as writing all
+    // it may.
     outcome->failure = std::current_exception();
     outcome->writes = window_.bounds().writes(colony_, item);
   }

@@ -1,8 +1,8 @@
 // simulator: decides what happens next, one event at a time, and applies it. The event history is the checkpoint:
 // replay() the stored events into a new simulator and step() goes on with the same bytes.
-// Method:  discrete events in the order (due time, kind, cell id); that serial order is the meaning. The window is how far the engine
-//          may look ahead and decide, on several threads, what conflicts with nothing before it (conflict.hpp); decided events
-//          wait for their turn.
+// Method:  discrete events in the order (due time, kind, cell id); that serial order is the meaning. The window is how far
+//          the engine may look ahead and decide, on several threads, what conflicts with nothing before it (conflict.hpp);
+//          decided events wait for their turn.
 // Random:  every draw is addressed by (seed, cell, ordinal, purpose, lane); no generator state.
 // Threads: one caller at a time; it decides too. Between two calls no other thread is at work.
 // Errors:  CheckFailure on a bug; founders that cannot be placed are an error of place_founders, found before a job starts.
@@ -41,8 +41,8 @@ struct RunSpec {
 
 /// The founding cells, ids 1..n, ready for `founded` events. Errors (kInvalid) point into the model object:
 /// "/founders/positions_um/3" for a founder that overlaps an earlier one beyond tolerance or lies outside the dish,
-/// "/founders" when 1,000 tries for one of them, or kFounderTriesMax for all, found no place. Pure: the same spec gives the same
-/// cells. Long for many thousands: throws Stopped when asked to.
+/// "/founders" when 1,000 tries for one of them, or kFounderTriesMax for all, found no place. Pure: the same spec gives the
+/// same cells. Long for many thousands: throws Stopped when asked to.
 Result<std::vector<Cell>> place_founders(const RunSpec& spec, StopFlag stop = nullptr);
 inline constexpr std::uint64_t kFounderTriesMax = 400'000;
 
@@ -51,18 +51,18 @@ std::uint64_t founder_count(const FounderParams& founders);
 
 class Simulator {
  public:
-  /// The spec must be valid (validate() empty, CHECKed). Founders are placed when the first of them is needed, so that replaying
-  /// a stored history costs no placement. While `stop` is set, step() throws Stopped and changes nothing.
-  /// `threads`, 1..kThreadsMax (CHECKed): how many may decide at once; it cannot change the history. With 1 nothing is decided
-  /// before its turn.
+  /// The spec must be valid (validate() empty, CHECKed). Founders are placed when the first of them is needed, so that
+  /// replaying a stored history costs no placement. While `stop` is set, step() throws Stopped and changes nothing.
+  /// `threads`, 1..kThreadsMax (CHECKed): how many may decide at once; it cannot change the history. With 1 nothing is
+  /// decided before its turn.
   explicit Simulator(RunSpec spec, StopFlag stop = nullptr, int threads = 1);
 
   /// Folds one stored event; nothing is decided. Events must come in order, from seq 1.
   void replay(const Event& stored);
 
-  /// Decides the next event, applies it and returns it, `finished` included; nullopt after `finished`. The colony is then as it is
-  /// after that event, however many later ones are decided already. A failed check comes out of the step whose event it concerns,
-  /// on any number of threads, and leaves the colony as it was.
+  /// Decides the next event, applies it and returns it, `finished` included; nullopt after `finished`. The colony is then
+  /// as it is after that event, however many later ones are decided already. A failed check comes out of the step whose
+  /// event it concerns, on any number of threads, and leaves the colony as it was.
   std::optional<Event> step();
 
   /// Ends the history from outside (cancel, limit, failure): the `finished` event at the current time, applied.

@@ -91,8 +91,8 @@ std::size_t Window::begin_round(const Colony& colony, std::size_t count_max, std
   return count;
 }
 
-// True if no uncommitted item before it stands in its way. Else it is listed with one that does. The reads are worked out at every
-// question, because an event of its own cell may have changed them since the last.
+// True if no uncommitted item before it stands in its way. Else it is listed with one that does. The reads are worked out
+// at every question, because an event of its own cell may have changed them since the last.
 bool Window::is_free(const Colony& colony, Number number) {
   ++counts_.question_count;
   const std::optional<Number> blocker = index_.find(bounds_.reads(colony, item(number)), first_, number);

@@ -1,7 +1,8 @@
 // window: what is due next, in serial order, and which of it can be decided already.
-// Method:  a sliding horizon: everything due before (first uncommitted due + window_h). Nothing that is committed makes anything due
-//          inside it, because every delay is at least window_h (CHECKed); so the list is the serial order, and only grows at its
-//          end. (A division may take away what else was due for its cell.) Decided items wait in their place for their turn.
+// Method:  a sliding horizon: everything due before (first uncommitted due + window_h). Nothing that is committed makes
+//          anything due inside it, because every delay is at least window_h (CHECKed); so the list is the serial order, and
+//          only grows at its end. (A division may take away what else was due for its cell.) Decided items wait in their
+//          place for their turn.
 // Threads: exclusive: during a round the caller guards every call by one mutex.
 #pragma once
 
@@ -57,16 +58,17 @@ class Window {
   /// The first item is committed: `colony` is as it is then.
   void pop(const Colony& colony);
 
-  /// A round: items are decided while the colony stands still. begin_round() looks further ahead and returns how many items are
-  /// ready, that is undecided and in conflict with no uncommitted item before them: the first item if that is undecided, and at most
-  /// `count_max`. It looks at no more than kLookAhead items, until kWaitingMax wait, and not past `end_h`.
+  /// A round: items are decided while the colony stands still. begin_round() looks further ahead and returns how many items
+  /// are ready, that is undecided and in conflict with no uncommitted item before them: the first item if that is
+  /// undecided, and at most `count_max`. It looks at no more than kLookAhead items, until kWaitingMax wait, and not past
+  /// `end_h`.
   std::size_t begin_round(const Colony& colony, std::size_t count_max, std::optional<double> end_h);
-  /// Hands out a ready item; one for each that begin_round() and finish() announced. In serial order, but settlings last: they are
-  /// short, nobody waits for them, and they fill the gaps at the end.
+  /// Hands out a ready item; one for each that begin_round() and finish() announced. In serial order, but settlings last:
+  /// they are short, nobody waits for them, and they fill the gaps at the end.
   Number take();
   const AgendaItem& item(Number number) const { return slot(number).item; }
-  /// Keeps the outcome until its turn, and returns how many more items are ready: what a decision writes is less than what it might
-  /// have written, so some that waited for it need not wait for its commit.
+  /// Keeps the outcome until its turn, and returns how many more items are ready: what a decision writes is less than what
+  /// it might have written, so some that waited for it need not wait for its commit.
   std::size_t finish(const Colony& colony, Number number, std::unique_ptr<Outcome> outcome);
   /// It was taken, but not decided.
   void give_back(Number number) { make_ready(number); }
@@ -76,8 +78,8 @@ class Window {
   /// Tests only: see ConflictBounds.
   void scale_bounds(const Params& params, double scale) { bounds_ = ConflictBounds(params, scale); }
 
-  /// Bounds of the work of one call: a dish has tens of thousands of items an hour. They decide what is found ready when, so never
-  /// a result.
+  /// Bounds of the work of one call: a dish has tens of thousands of items an hour. They decide what is found ready when,
+  /// so never a result.
   static constexpr std::size_t kLookAhead = 4096;
   static constexpr std::size_t kWaitingMax = 256;
 

@@ -1,5 +1,5 @@
-// The bounds by which events run at once, held against what events really write and read: a history is walked through serially, and
-// for each event the bounds that the simulator would have used are checked.
+// The bounds by which events run at once, held against what events really write and read: a history is walked through
+// serially, and for each event the bounds that the simulator would have used are checked.
 #include <cstdio>
 #include <functional>
 #include <map>
@@ -38,6 +38,10 @@ Writes written(const Colony& before, const Colony& after, CellId subject) {
   return out;
 }
 
+bool holds(const Writes& outer, const Writes& inner) {
+  return contains(outer.bodies, inner.bodies) && contains(outer.sleepers, inner.sleepers);
+}
+
 DueKind kind_of(const Event& event) {
   if (event.kind() == EventKind::kSettled) return DueKind::kSettle;
   return event.kind() == EventKind::kMoved ? DueKind::kMove : DueKind::kDivide;
@@ -49,8 +53,8 @@ EventBody decision(const Colony& colony, const RunSpec& spec, const AgendaItem& 
   return decide_division(colony, spec.params, spec.seed, item.cell_id, item.due_h, workspace).body;
 }
 
-// The same colony with all that `reads` says does not matter made different: bodies that do not meet it carried off, sleep turned
-// into waking and back beyond it.
+// The same colony with all that `reads` says does not matter made different: bodies that do not meet it carried off, sleep
+// turned into waking and back beyond it.
 struct Other {
   Colony colony;
   int carried_off_count = 0;
@@ -148,12 +152,13 @@ TEST(ConflictBounds, HoldWhatIsWritten) {
       const Writes real = written(before, after, item.cell_id);
       const Writes decided = bounds.writes(before, item, event.body);
       const auto& [bound, half_bound] = entered.at(item);
-      ASSERT_TRUE(contains(decided.bodies, real.bodies) && contains(decided.sleepers, real.sleepers)) << name << " seq " << event.seq;
-      ASSERT_TRUE(contains(bound.bodies, decided.bodies) && contains(bound.sleepers, decided.sleepers)) << name << " seq " << event.seq;
-      outside_half_count += contains(half_bound.bodies, real.bodies) && contains(half_bound.sleepers, real.sleepers) ? 0 : 1;
+      ASSERT_TRUE(holds(decided, real)) << name << " seq " << event.seq;
+      ASSERT_TRUE(holds(bound, decided)) << name << " seq " << event.seq;
+      outside_half_count += holds(half_bound, real) ? 0 : 1;
       sleeper_count += real.sleepers.empty() ? 0 : 1;
     });
-    std::printf("%s: %d events wrote outside half the bound, %d wrote sleepers\n", name.c_str(), outside_half_count, sleeper_count);
+    std::printf("%s: %d events wrote outside half the bound, %d wrote sleepers\n", name.c_str(), outside_half_count,
+                sleeper_count);
     EXPECT_GT(outside_half_count, 0) << name;  // the test can see a bound that is too small
     all_sleeper_count += sleeper_count;
   }
@@ -177,8 +182,8 @@ TEST(ConflictBounds, HoldWhatIsRead) {
       const Other too_much = with_the_rest_changed(before, spec, small.reads(before, item));
       differing_count += decision(too_much.colony, spec, item) == expected ? 0 : 1;
     });
-    std::printf("%s: %d events, %d bodies carried off, %d sleeps turned; %d events differ with 0.4 of the bound\n", name.c_str(),
-                compared_count, carried_off_count, turned_count, differing_count);
+    std::printf("%s: %d events, %d bodies carried off, %d sleeps turned; %d events differ with 0.4 of the bound\n",
+                name.c_str(), compared_count, carried_off_count, turned_count, differing_count);
     EXPECT_GT(carried_off_count, compared_count) << name;
     EXPECT_GT(turned_count, compared_count) << name;
     EXPECT_GT(differing_count, 0) << name;
@@ -234,7 +239,26 @@ TEST_F(ConflictBoundsAtTheEdge, ASettlingBeforeTheDivisionMovesTheNucleus) {
   settled.due_h = 10.0;
   apply(id, settled);
   const Writes after = bounds.writes(colony_, division(id));
-  EXPECT_TRUE(contains(before.bodies, after.bodies) && contains(before.sleepers, after.sleepers));
+  EXPECT_TRUE(holds(before, after));
+}
+
+TEST_F(ConflictBoundsAtTheEdge, AMoveTakesBodyAndSleepAlong) {
+  const CellId id = add(0.0, Vec3::Zero());
+  apply(id, Inhibited{});  // asleep
+  const ConflictBounds bounds(params_);
+  const AgendaItem move = {10.0, DueKind::kMove, id};
+  Moved moved{colony_.cell(id), {}};
+  moved.cell.centre_um.x() += params_.motility.step_um;
+  const Writes bound = bounds.writes(colony_, move), decided = bounds.writes(colony_, move, moved);
+  ++moved.cell.ordinal;
+  const Vec3 from_um = colony_.cell(id).centre_um;
+  const Rect old_box = box(id);
+  apply(id, moved);
+  for (const Writes& writes : {bound, decided}) {
+    EXPECT_TRUE(contains(writes.bodies, hull(old_box, box(id))));
+    EXPECT_TRUE(contains(writes.sleepers, hull(rect_of(from_um), rect_of(moved.cell.centre_um))));
+  }
+  EXPECT_TRUE(holds(bound, decided));
 }
 
 // The neighbours of the neighbours of a candidate: read where neighbours are asked what they retain.

@@ -1,5 +1,5 @@
-// Threads and windows: what may run at once never shows. One history on any number of threads, for any window, from any prefix. The
-// bounds this rests on are tested in conflict_test.cpp.
+// Threads and windows: what may run at once never shows. One history on any number of threads, for any window, from any
+// prefix. The bounds this rests on are tested in conflict_test.cpp.
 #include <xmmintrin.h>
 
 #include <atomic>
