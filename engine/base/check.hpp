@@ -14,6 +14,9 @@ class CheckFailure : public std::logic_error {
   using std::logic_error::logic_error;
 };
 
+/// What lives on this thread, as it ends a message: "; outer; inner", "" if nothing does. For a failure that was kept on another thread.
+std::string failure_contexts();
+
 /// Names what is being worked on while it lives, so that a failed check on this thread says how to replay it.
 /// Contexts nest; the innermost comes last in the message.
 class FailureContext {
@@ -24,7 +27,7 @@ class FailureContext {
   FailureContext& operator=(const FailureContext&) = delete;
 
  private:
-  friend void fail_check(const char*, const char*, int);
+  friend std::string failure_contexts();
   std::string text_;
   FailureContext* outer_;
 };

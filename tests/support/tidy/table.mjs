@@ -34,6 +34,8 @@ export const thirdParty = [
   { prefix: 'Random123/', places: ['engine/random/'] },
   { prefix: 'xmmintrin.h', places: ['engine/base/'] },  // the floating-point mode
   { prefix: 'hwy/', places: ['engine/space/'] },
+  { prefix: 'tbb/', places: ['engine/sim/'] },
+  { prefix: 'oneapi/', places: [] },  // the same library's other name: say tbb/
   { prefix: 'Eigen/', places: ['engine/'] },
   { prefix: 'curl/', places: ['client/'] },
   { prefix: 'CLI/', places: ['client/', 'server/config.*'] },
