@@ -116,6 +116,11 @@ http::BodySource::Pull LogSource::pull(std::string& out) {
   return page_.empty() ? Pull::kEnd : Pull::kMore;
 }
 
+void append_event_message(std::string& out, const Event& event) {
+  out += "event: " + std::string(name_of(event.kind())) + "\nid: " + std::to_string(event.seq) +
+         "\ndata: " + to_text(encode_event(event)) + "\n\n";
+}
+
 EventStream::EventStream(JobService& jobs, const JobView& view, StreamWish wish, Clock clock)
     : jobs_(jobs), id_(view.job.id), job_key_(view.job.job_key), wish_(std::move(wish)), clock_(std::move(clock)) {}
 
@@ -157,8 +162,7 @@ http::BodySource::Pull EventStream::pull(std::string& out) {
       std::size_t used = 0;
       for (; used < page_.size() && out.size() < kPieceBytes; ++used) {
         const Event& event = page_[used];
-        out += "event: " + std::string(name_of(event.kind())) + "\nid: " + std::to_string(event.seq) +
-               "\ndata: " + to_text(encode_event(event)) + "\n\n";
+        append_event_message(out, event);
         wish_.filter.after = event.seq;
       }
       page_.erase(page_.begin(), page_.begin() + static_cast<std::ptrdiff_t>(used));

@@ -86,6 +86,9 @@ struct StreamWish {
   bool progress = true;
 };
 
+/// One event of a history as a server-sent message.
+void append_event_message(std::string& out, const Event& event);
+
 /// Server-sent events of one job.
 class EventStream : public http::BodySource {
  public:

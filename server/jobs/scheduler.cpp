@@ -20,6 +20,7 @@ LocalJobService::~LocalJobService() { drain(); }
 
 Status LocalJobService::start() {
   if (config_.concurrent_max < 1) return Error{ErrorCode::kInvalid, "jobs.concurrent_max must be 1 or more"};
+  if (config_.threads_per_job < 1) return Error{ErrorCode::kInvalid, "jobs.threads_per_job must be 1 or more"};
   auto running = store_.running_jobs();
   if (!running) return running.error();
   JobFilter paused;
