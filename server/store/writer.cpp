@@ -10,7 +10,7 @@
 namespace colony::server {
 namespace {
 constexpr std::size_t kRequestsPerBatch = 256;  // so that a flood of requests cannot starve the events
-constexpr int kCheckpointPages = 1000;          // 4 MB of log
+constexpr int kCheckpointPages = 8000;          // 32 MB of log: a page that is written again and again is moved once
 constexpr int kCheckpointWaitPages = 25'000;    // 100 MB: readers kept the log from restarting for too long
 constexpr std::chrono::seconds kSweepRetry{10};
 
