@@ -4,14 +4,24 @@
 #include <stdexcept>
 #include <utility>
 
+#include "server/api/event_text.hpp"
+
 namespace colony::server::api {
 namespace {
 
 constexpr auto kNoTail = [](const std::optional<std::string>&) { return std::string(); };
 
 template <class Item>
-ListFormat<Item> lines_format(Json (*encode)(const Item&)) {
-  return {"", "", [encode](std::string& out, const Item& item) { out += to_text(encode(item)) + '\n'; }, kNoTail};
+using AppendText = void (*)(std::string& out, const Item& item);
+
+template <class Item>
+ListFormat<Item> lines_format(AppendText<Item> append) {
+  return {"", "",
+          [append](std::string& out, const Item& item) {
+            append(out, item);
+            out += '\n';
+          },
+          kNoTail};
 }
 
 template <class Item>
@@ -23,32 +33,32 @@ ListFormat<Item> csv_format(std::span<const Column<Item>> columns) {
 
 // {<facts>, "items": [...], "next": ...}
 template <class Item>
-ListFormat<Item> envelope_format(const Json& facts, Json (*encode)(const Item&)) {
+ListFormat<Item> envelope_format(const Json& facts, AppendText<Item> append) {
   std::string head = to_text(facts);
   head.pop_back();
   head += facts.empty() ? "\"items\":[" : ",\"items\":[";
-  return {head, ",", [encode](std::string& out, const Item& item) { out += to_text(encode(item)); },
+  return {head, ",", append,
           [](const std::optional<std::string>& next) {
             return "],\"next\":" + (next ? to_text(Json(*next)) : std::string("null")) + "}";
           }};
 }
 
 template <class Item>
-ListFormat<Item> format_for(std::string_view media, const Json& facts, Json (*encode)(const Item&),
+ListFormat<Item> format_for(std::string_view media, const Json& facts, AppendText<Item> append,
                             std::span<const Column<Item>> columns) {
   if (media == "text/csv") return csv_format(columns);
-  if (media == "application/x-ndjson") return lines_format(encode);
-  return envelope_format(facts, encode);
+  if (media == "application/x-ndjson") return lines_format<Item>(append);
+  return envelope_format<Item>(facts, append);
 }
 
 }  // namespace
 
 ListFormat<Event> event_format(std::string_view media) {
-  return format_for(media, Json::object(), &encode_event, event_columns());
+  return format_for(media, Json::object(), &append_event_text, event_columns());
 }
 
 ListFormat<Cell> cell_format(std::string_view media, const Json& facts) {
-  return format_for(media, facts, &encode_cell, cell_columns());
+  return format_for(media, facts, &append_cell_text, cell_columns());
 }
 
 EventListSource::EventListSource(JobService& jobs, std::string id, EventFilter filter, std::optional<std::size_t> limit,
@@ -117,8 +127,10 @@ http::BodySource::Pull LogSource::pull(std::string& out) {
 }
 
 void append_event_message(std::string& out, const Event& event) {
-  out += "event: " + std::string(name_of(event.kind())) + "\nid: " + std::to_string(event.seq) +
-         "\ndata: " + to_text(encode_event(event)) + "\n\n";
+  ((out += "event: ") += name_of(event.kind())) += "\nid: ";
+  (out += std::to_string(event.seq)) += "\ndata: ";
+  append_event_text(out, event);
+  out += "\n\n";
 }
 
 EventStream::EventStream(JobService& jobs, const JobView& view, StreamWish wish, Clock clock)
