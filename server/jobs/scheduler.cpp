@@ -1,4 +1,6 @@
 // The threads of LocalJobService: runners that take jobs, and one that brings back jobs stopped by the store.
+#include <pthread.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -100,6 +102,7 @@ Result<std::pair<JobRow, std::shared_ptr<LiveJob>>> LocalJobService::take() {
 }
 
 void LocalJobService::run_loop() {
+  pthread_setname_np(pthread_self(), "runner");  // as operators see it, per thread; the engine's threads inherit it
   for (;;) {
     std::uint64_t nudges = 0;
     {

@@ -1,5 +1,7 @@
 #include "server/store/writer.hpp"
 
+#include <pthread.h>
+
 #include <algorithm>
 #include <exception>
 #include <future>
@@ -115,6 +117,7 @@ std::vector<WriteTask> Writer::next_batch(std::unique_lock<std::mutex>& lock) {
 }
 
 void Writer::loop() {
+  pthread_setname_np(pthread_self(), "writer");  // as operators see it, per thread
   std::unique_lock lock(mutex_);
   for (;;) {
     const bool due = !requests_.empty() || urgent_bulk_ > 0 || bulk_rows_ >= limits_.batch_rows_max ||
