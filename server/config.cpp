@@ -133,17 +133,19 @@ const std::vector<Key>& keys() {
       integer_key<Size>("jobs.concurrent_max", 1, kThreadsMax,
                         "colonies growing at a time; default: as many as the cores hold with threads_per_job each",
                         [](Config& c) -> Size& { return c.jobs.concurrent_max; }),
-      integer_key<int>("jobs.threads_per_job", 1, kThreadsMax,
-                       "threads a colony may decide on; default: the cores a job has with concurrent_max of them, or up "
-                       "to 4 if that is not given either",
-                       [](Config& c) -> int& { return c.jobs.threads_per_job; }),
+      integer_key<int>(
+          "jobs.threads_per_job", 1, kThreadsMax,
+          "threads a colony may decide on; default: the cores a job has with concurrent_max of them, or up "
+          "to 4 if that is not given either",
+          [](Config& c) -> int& { return c.jobs.threads_per_job; }),
       integer_key<Size>("jobs.queued_max", 1, 1'000'000, "jobs waiting; default 1000",
                         [](Config& c) -> Size& { return c.jobs.queued_max; }),
       integer_key<Big>("limits.cells_max", 1, 4'294'967'295, "cells of a job; default 1000000",
                        [](Config& c) -> Big& { return c.jobs.cells_max; }),
       integer_key<Big>("limits.events_max", 1, 1'000'000'000'000, "events of a job; default 50000000",
                        [](Config& c) -> Big& { return c.jobs.events_max; }),
-      integer_key<Big>("limits.cached_cells_max", 1, 1'000'000'000, "cells of all folded colonies kept; default 2000000",
+      integer_key<Big>("limits.cached_cells_max", 1, 1'000'000'000,
+                       "cells of all folded colonies kept; default 2000000",
                        [](Config& c) -> Big& { return c.jobs.cached_cells_max; }),
       integer_key<Size>("limits.cached_colonies_max", 1, 10'000,
                         "folded colonies kept for pictures and tables; default 16",
@@ -257,7 +259,8 @@ void share_cores(std::uint64_t cores, JobsConfig& jobs) {
   constexpr std::uint64_t kThreadsUnasked = 4;
   cores = std::clamp<std::uint64_t>(cores, 1, kThreadsMax);
   if (jobs.threads_per_job == 0) {
-    const std::uint64_t share = jobs.concurrent_max == 0 ? std::min(cores, kThreadsUnasked) : cores / jobs.concurrent_max;
+    const std::uint64_t share =
+        jobs.concurrent_max == 0 ? std::min(cores, kThreadsUnasked) : cores / jobs.concurrent_max;
     jobs.threads_per_job = static_cast<int>(std::max<std::uint64_t>(1, share));
   }
   if (jobs.concurrent_max == 0) {

@@ -21,10 +21,11 @@ void index_cells_if_due(Connection& connection, std::int64_t job_key, std::uint6
   if (last - indexed < static_cast<std::int64_t>(kUnindexedEventsMax)) return;
   // UNION sorts by (cell_id, seq), the order of the table: every page is written once.
   connection
-      .prepared("INSERT INTO cell_event SELECT ?1, cell_id, seq FROM"
-                " (SELECT cell_id, seq FROM event WHERE job_key = ?1 AND seq > ?2 AND seq <= ?3 AND cell_id IS NOT NULL"
-                " UNION SELECT cell_id, seq FROM placement WHERE job_key = ?1 AND seq > ?2 AND seq <= ?3)"
-                " ORDER BY cell_id, seq")
+      .prepared(
+          "INSERT INTO cell_event SELECT ?1, cell_id, seq FROM"
+          " (SELECT cell_id, seq FROM event WHERE job_key = ?1 AND seq > ?2 AND seq <= ?3 AND cell_id IS NOT NULL"
+          " UNION SELECT cell_id, seq FROM placement WHERE job_key = ?1 AND seq > ?2 AND seq <= ?3)"
+          " ORDER BY cell_id, seq")
       .bind(job_key)
       .bind(indexed)
       .bind(last)
@@ -34,8 +35,9 @@ void index_cells_if_due(Connection& connection, std::int64_t job_key, std::uint6
 
 bool sweep_cell_index(Connection& connection, std::int64_t job_key) {
   connection
-      .prepared("DELETE FROM cell_event WHERE job_key = ?1"
-                " AND cell_id < (SELECT min(cell_id) FROM cell_event WHERE job_key = ?1) + ?2")
+      .prepared(
+          "DELETE FROM cell_event WHERE job_key = ?1"
+          " AND cell_id < (SELECT min(cell_id) FROM cell_event WHERE job_key = ?1) + ?2")
       .bind(job_key)
       .bind(kSweepCells)
       .run();

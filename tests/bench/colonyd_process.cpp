@@ -1,19 +1,18 @@
 #include "tests/bench/colonyd_process.hpp"
 
 #include <arpa/inet.h>
+#include <cstring>
 #include <fcntl.h>
+#include <filesystem>
+#include <fstream>
 #include <netinet/in.h>
 #include <signal.h>
+#include <sstream>
+#include <stdexcept>
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
-
-#include <cstring>
-#include <filesystem>
-#include <fstream>
-#include <sstream>
-#include <stdexcept>
 
 extern char** environ;
 
@@ -71,7 +70,8 @@ ColonydProcess::ColonydProcess(const std::string& program, std::vector<std::stri
   std::string line;
   for (char c = 0; read(out_, &c, 1) == 1 && c != '\n';) line += c;
   const std::size_t colon = line.rfind(':');
-  if (!line.starts_with("listening on http://127.0.0.1:")) throw std::runtime_error(program + " does not listen: " + line);
+  if (!line.starts_with("listening on http://127.0.0.1:"))
+    throw std::runtime_error(program + " does not listen: " + line);
   port_ = static_cast<std::uint16_t>(std::stoul(line.substr(colon + 1)));
 }
 
@@ -96,8 +96,9 @@ int ColonydProcess::connect() const {
 
 std::string ColonydProcess::request(const std::string& method, const std::string& path, const std::string& body) const {
   const int socket = connect();
-  send_all(socket, method + " " + path + " HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\nAccept: application/json\r\n" +
-                       "Content-Type: application/json\r\nContent-Length: " + std::to_string(body.size()) + "\r\n\r\n" + body);
+  send_all(socket,
+           method + " " + path + " HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\nAccept: application/json\r\n" +
+               "Content-Type: application/json\r\nContent-Length: " + std::to_string(body.size()) + "\r\n\r\n" + body);
   std::string answer;
   std::vector<char> buffer(kReadBytes);
   for (ssize_t got = 0; (got = recv(socket, buffer.data(), buffer.size(), 0)) > 0;) {

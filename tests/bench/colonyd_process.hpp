@@ -2,13 +2,12 @@
 // Errors:  std::runtime_error with what went wrong.
 #pragma once
 
-#include <sys/types.h>
-
 #include <cstdint>
 #include <functional>
 #include <map>
 #include <string>
 #include <string_view>
+#include <sys/types.h>
 #include <vector>
 
 #include "tests/support/temp_dir.hpp"

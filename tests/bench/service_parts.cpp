@@ -2,11 +2,10 @@
 // store and stream can be judged apart from the engine.
 #include "tests/bench/service_parts.hpp"
 
-#include <sys/resource.h>
-
 #include <chrono>
 #include <cstdio>
 #include <string>
+#include <sys/resource.h>
 #include <vector>
 
 #include "engine/analysis/series.hpp"
@@ -22,7 +21,9 @@ namespace {
 constexpr std::size_t kBatchEvents = 200;  // as the runner's
 constexpr std::size_t kCellsMin = 1000;
 
-double seconds_of(const timeval& time) { return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec); }
+double seconds_of(const timeval& time) {
+  return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+}
 
 double cpu_s(int who) {
   rusage usage{};
@@ -142,7 +143,8 @@ int run_parts(std::uint64_t divisions) {
   if (!(*store)->flush() || failed) return 1;
   making_s = writing.own_s();
   print("write", writing.others_s(), writing.wall_s(), divided,
-        std::to_string(seq) + " events, " + std::to_string(woken) + " woken; the maker took " + std::to_string(making_s) + " s");
+        std::to_string(seq) + " events, " + std::to_string(woken) + " woken; the maker took " +
+            std::to_string(making_s) + " s");
 
   Meter reading;
   server::EventFilter filter;

@@ -56,7 +56,8 @@ class StoreIndexTest : public testing::Test {
     return (*store_->take_queued_job())->job_key;
   }
   void append(EventBatch batch) {
-    store_->append_events(std::move(batch), [](const Status& status) { EXPECT_TRUE(status) << status.error().message; });
+    store_->append_events(std::move(batch),
+                          [](const Status& status) { EXPECT_TRUE(status) << status.error().message; });
     ASSERT_TRUE(store_->flush());
   }
   std::int64_t number(const std::string& sql) {
@@ -73,8 +74,9 @@ class StoreIndexTest : public testing::Test {
         std::vector<std::uint64_t> expected, found;
         for (const Event& event : *all) {
           const auto* divided = std::get_if<Divided>(&event.body);
-          const bool takes_part = event.cell_id == CellId{cell} ||
-                                  (divided != nullptr && (divided->cells[0].id.value == cell || divided->cells[1].id.value == cell));
+          const bool takes_part =
+              event.cell_id == CellId{cell} ||
+              (divided != nullptr && (divided->cells[0].id.value == cell || divided->cells[1].id.value == cell));
           if (takes_part && event.seq > after) expected.push_back(event.seq);
         }
         EventFilter filter;
@@ -137,9 +139,10 @@ TEST_F(StoreIndexTest, IsMadeForADatabaseOfTheFirstSchema) {
   store_.reset();
   {
     Connection old(dir_.path() + "/colony.db", Connection::Access::kWriter);
-    old.execute("DROP TABLE cell_event; ALTER TABLE job DROP COLUMN indexed_seq;"
-                "CREATE INDEX event_by_cell ON event (job_key, cell_id, seq);"
-                "CREATE INDEX placement_by_cell ON placement (job_key, cell_id, seq); PRAGMA user_version = 1");
+    old.execute(
+        "DROP TABLE cell_event; ALTER TABLE job DROP COLUMN indexed_seq;"
+        "CREATE INDEX event_by_cell ON event (job_key, cell_id, seq);"
+        "CREATE INDEX placement_by_cell ON placement (job_key, cell_id, seq); PRAGMA user_version = 1");
     old.checkpoint(true);
   }
   open();
