@@ -52,7 +52,7 @@ class Coverage {
   void raise(Tile& tile, std::size_t at, std::int32_t column, std::int32_t row);
   void lower(Tile& tile, std::size_t at, std::int32_t column, std::int32_t row);
 
-  std::unordered_map<std::uint64_t, Tile> tiles_;  // by tile column and row; references outlive a rehash
+  std::unordered_map<std::uint64_t, Tile> tiles_;  // by tile column and row; looked up, never iterated
   std::map<std::pair<std::int32_t, std::int32_t>, std::uint32_t> above_;  // (column, row) -> count beyond 255; none is 0
   std::uint64_t area_um2_ = 0;
   std::vector<RowSpan> spans_;     // scratch

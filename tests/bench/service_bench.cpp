@@ -177,7 +177,7 @@ int run_job(const Options& options) {
 
 int usage() {
   std::fprintf(stderr,
-               "usage: colony-service-bench job [--cells N] [--threads N] [--seed N] [--rounds N] [--colonyd PATH]\n"
+               "usage: colony-service-bench job [--cells N] [--threads N] [--seed N] [--rounds N] [--quick 1] [--colonyd PATH]\n"
                "       colony-service-bench parts [--divisions N]\n");
   return 2;
 }

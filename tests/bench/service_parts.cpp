@@ -159,6 +159,14 @@ int run_parts(std::uint64_t divisions) {
   } while (!page.empty());
   print("read", reading.own_s(), reading.wall_s(), divided, std::to_string(read) + " events");
 
+  Meter asking;
+  server::EventFilter of_cell;
+  of_cell.cell_id = 1;
+  const auto found = (*store)->read_events(job_key, of_cell, server::api::kEventsPerRead);
+  if (!found) return 1;
+  print("one_cell", asking.own_s(), asking.wall_s(), divided,
+        std::to_string(found->size()) + " events of one cell in " + std::to_string(1e3 * asking.wall_s()) + " ms");
+
   std::string text;
   std::uint64_t bytes = 0;
   Meter encoding;
