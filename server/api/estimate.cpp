@@ -25,7 +25,7 @@ struct Calibration {
   // Peak memory of colonyd, and database_MB of colony-service-bench.
   double memory_base_bytes = 30e6;
   double memory_per_cell_bytes = 1500.0;
-  double stored_per_cell_bytes = 3000.0;
+  double stored_per_cell_bytes = 1500.0;
 };
 constexpr Calibration kMeasured;
 

@@ -150,10 +150,10 @@ double run_round(const Options& options, std::uint64_t round) {
   const auto per_division_us = [&](double seconds) {
     return 1e6 * seconds / static_cast<double>(std::max<std::uint64_t>(1, bare.divisions));
   };
-  std::printf("%llu,%llu,%d,%llu,%.3f,%.3f,%.3f,%.3f,%.3f,%.1f,%.1f,%.1f,%.1f,%.1f,%.1f,%.1f,%.1f,%s,%s\n",
+  std::printf("%llu,%llu,%d,%llu,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.1f,%.1f,%.1f,%.1f,%.1f,%.1f,%.1f,%.1f,%s,%s\n",
               static_cast<unsigned long long>(round), static_cast<unsigned long long>(options.cells), options.threads,
               static_cast<unsigned long long>(bare.events), bare.wall_s, bare.cpu_s, wall_s, server_s, ratio,
-              per_division_us(runner_s - bare.cpu_s), per_division_us(writer_s),
+              server_s / bare.cpu_s, per_division_us(runner_s - bare.cpu_s), per_division_us(writer_s),
               per_division_us(server_s - runner_s - writer_s), per_division_us(reader_s), per_division_us(again_s),
               per_division_us(again_wall_s), static_cast<double>(stream.bytes()) / 1e6,
               static_cast<double>(bytes) / 1e6, bare.digest.c_str(), job["digest"].get<std::string>().c_str());
@@ -164,7 +164,8 @@ double run_round(const Options& options, std::uint64_t round) {
 
 int run_job(const Options& options) {
   std::printf(
-      "round,cells,threads,events,bare_wall_s,bare_cpu_s,service_wall_s,service_cpu_s,wall_ratio,runner_us_per_"
+      "round,cells,threads,events,bare_wall_s,bare_cpu_s,service_wall_s,service_cpu_s,wall_ratio,cpu_ratio,runner_us_"
+      "per_"
       "division,"
       "writer_us_per_division,http_us_per_division,reader_us_per_division,"
       "again_us_per_division,again_wall_us_per_division,stream_MB,database_MB,bare_digest,job_digest\n");
@@ -176,9 +177,10 @@ int run_job(const Options& options) {
 }
 
 int usage() {
-  std::fprintf(stderr,
-               "usage: colony-service-bench job [--cells N] [--threads N] [--seed N] [--rounds N] [--quick 1] [--colonyd PATH]\n"
-               "       colony-service-bench parts [--divisions N]\n");
+  std::fprintf(
+      stderr,
+      "usage: colony-service-bench job [--cells N] [--threads N] [--seed N] [--rounds N] [--quick 1] [--colonyd PATH]\n"
+      "       colony-service-bench parts [--divisions N]\n");
   return 2;
 }
 
