@@ -12,6 +12,8 @@
 namespace colony::server {
 namespace {
 
+constexpr std::uint64_t kThreadsMax = 256;  // of a job, and jobs at a time
+
 enum class KeyType { kText, kInteger, kTexts };
 
 struct Key {
@@ -128,15 +130,22 @@ const std::vector<Key>& keys() {
       {"server.base_path", KeyType::kText, 0, 0,
        "where a proxy shows this server, e.g. /colony; every path must begin with it; default none", set_base_path},
       {"server.allowed_hosts", KeyType::kTexts, 0, 0, "host names a request may be for, without port", set_hosts},
-      integer_key<Size>("jobs.concurrent_max", 1, 256, "colonies growing at a time; default 1",
+      integer_key<Size>("jobs.concurrent_max", 1, kThreadsMax,
+                        "colonies growing at a time; default: as many as the cores hold with threads_per_job each",
                         [](Config& c) -> Size& { return c.jobs.concurrent_max; }),
+      integer_key<int>(
+          "jobs.threads_per_job", 1, kThreadsMax,
+          "threads a colony may decide on; default: the cores a job has with concurrent_max of them, or up "
+          "to 4 if that is not given either",
+          [](Config& c) -> int& { return c.jobs.threads_per_job; }),
       integer_key<Size>("jobs.queued_max", 1, 1'000'000, "jobs waiting; default 1000",
                         [](Config& c) -> Size& { return c.jobs.queued_max; }),
       integer_key<Big>("limits.cells_max", 1, 4'294'967'295, "cells of a job; default 1000000",
                        [](Config& c) -> Big& { return c.jobs.cells_max; }),
       integer_key<Big>("limits.events_max", 1, 1'000'000'000'000, "events of a job; default 50000000",
                        [](Config& c) -> Big& { return c.jobs.events_max; }),
-      integer_key<Big>("limits.cached_cells_max", 1, 1'000'000'000, "cells of all folded colonies kept; default 2000000",
+      integer_key<Big>("limits.cached_cells_max", 1, 1'000'000'000,
+                       "cells of all folded colonies kept; default 2000000",
                        [](Config& c) -> Big& { return c.jobs.cached_cells_max; }),
       integer_key<Size>("limits.cached_colonies_max", 1, 10'000,
                         "folded colonies kept for pictures and tables; default 16",
@@ -244,6 +253,21 @@ void read_environment(const Environment& environment, Config& config, Errors& er
   }
 }
 
+// What was not given (0) follows from what was: together the jobs take the cores there are, and no more. Four threads where nothing
+// is said: a large colony gains by them, and small ones, which gain little, rather by being grown at the same time.
+void share_cores(std::uint64_t cores, JobsConfig& jobs) {
+  constexpr std::uint64_t kThreadsUnasked = 4;
+  cores = std::clamp<std::uint64_t>(cores, 1, kThreadsMax);
+  if (jobs.threads_per_job == 0) {
+    const std::uint64_t share =
+        jobs.concurrent_max == 0 ? std::min(cores, kThreadsUnasked) : cores / jobs.concurrent_max;
+    jobs.threads_per_job = static_cast<int>(std::max<std::uint64_t>(1, share));
+  }
+  if (jobs.concurrent_max == 0) {
+    jobs.concurrent_max = std::max<std::uint64_t>(1, cores / static_cast<std::uint64_t>(jobs.threads_per_job));
+  }
+}
+
 std::string default_data_dir(const Environment& environment) {
   const auto value = [&](const char* name) {
     const auto found =
@@ -259,7 +283,7 @@ std::string default_data_dir(const Environment& environment) {
 }  // namespace
 
 Result<Invocation> configure(const std::vector<std::string>& arguments, const Environment& environment,
-                             std::string_view version) {
+                             std::string_view version, std::uint64_t cores) {
   CLI::App app("colonyd: grows cell colonies as jobs over HTTP", "colonyd");
   std::string config_path;
   std::map<std::string, std::vector<std::string>> given;  // by key
@@ -289,6 +313,8 @@ Result<Invocation> configure(const std::vector<std::string>& arguments, const En
 
   Errors errors;
   Config& config = invocation.config;
+  config.jobs.concurrent_max = 0;  // not given
+  config.jobs.threads_per_job = 0;
   if (!config_path.empty()) read_file(config_path, config, errors);
   read_environment(environment, config, errors);
   for (const auto& [name, values] : given) {
@@ -299,6 +325,7 @@ Result<Invocation> configure(const std::vector<std::string>& arguments, const En
   if (config.store.data_dir.empty())
     errors.push_back({"--server.data", "is needed: neither XDG_DATA_HOME nor HOME is set"});
   if (!errors.empty()) return Error{ErrorCode::kInvalid, "the configuration is wrong", std::move(errors)};
+  share_cores(cores, config.jobs);
   return invocation;
 }
 

@@ -35,8 +35,9 @@ struct Invocation {
 
 using Environment = std::vector<std::pair<std::string, std::string>>;
 
-/// `arguments` without the program's name.
+/// `arguments` without the program's name. `cores`: what this process may use; jobs.concurrent_max and jobs.threads_per_job, where
+/// not given, are such that their product is at most that. Given values stand, also where they are too many.
 Result<Invocation> configure(const std::vector<std::string>& arguments, const Environment& environment,
-                             std::string_view version);
+                             std::string_view version, std::uint64_t cores);
 
 }  // namespace colony::server

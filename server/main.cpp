@@ -1,10 +1,14 @@
 // colonyd: wires store, jobs, api and http together, and ends them in the opposite order.
 // Exit: 0 after SIGTERM or SIGINT; 1 if it cannot start (data locked, port taken); 2 if the configuration is wrong.
+#include <sched.h>
+
+#include <algorithm>
 #include <csignal>
 #include <cstdio>
 #include <exception>
 #include <memory>
 #include <string>
+#include <thread>
 
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
@@ -29,6 +33,13 @@ Environment environment() {
     }
   }
   return out;
+}
+
+// Those this process may run on, which can be fewer than the machine has.
+std::uint64_t usable_cores() {
+  cpu_set_t set;
+  if (sched_getaffinity(0, sizeof set, &set) == 0) return static_cast<std::uint64_t>(CPU_COUNT(&set));
+  return std::max(1U, std::thread::hardware_concurrency());
 }
 
 std::string text_of(const Error& error) {
@@ -96,6 +107,9 @@ int serve(const Config& config) {
               config.http.base_path.c_str());
   std::fflush(stdout);
   spdlog::info("data in {}", config.store.data_dir);
+  const std::uint64_t threads = config.jobs.concurrent_max * static_cast<std::uint64_t>(config.jobs.threads_per_job);
+  spdlog::info("{} jobs at a time, {} threads a job", config.jobs.concurrent_max, config.jobs.threads_per_job);
+  if (threads > usable_cores()) spdlog::warn("{} threads are to share {} cores", threads, usable_cores());
 
   const int signal = wait_for_signal(signals);
   spdlog::info("ending on signal {}", signal);
@@ -109,7 +123,8 @@ int serve(const Config& config) {
 int run(int argc, char** argv) {
   spdlog::set_default_logger(spdlog::stderr_logger_mt("colonyd"));
   spdlog::set_pattern("%Y-%m-%dT%H:%M:%S.%eZ %l %v", spdlog::pattern_time_type::utc);
-  const auto invocation = configure(std::vector<std::string>(argv + 1, argv + argc), environment(), COLONY_VERSION);
+  const auto invocation = configure(std::vector<std::string>(argv + 1, argv + argc), environment(), COLONY_VERSION,
+                                    usable_cores());
   if (!invocation) {
     spdlog::error("{}", text_of(invocation.error()));
     return 2;

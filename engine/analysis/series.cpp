@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <compare>
 #include <vector>
 
 #include "engine/base/check.hpp"
@@ -12,42 +11,8 @@ namespace colony {
 namespace {
 
 constexpr double kUm2PerMm2 = 1e6;
-constexpr double kCoordinateMax_um = 2e9;  // a grid index fits 32 bits; cells lie within 1e9 um (grid.cpp)
-
-/// Grid cells first..last of one row, whose centres (first + 0.5, row + 0.5) ... lie in one footprint.
-struct RowSpan {
-  std::int32_t row = 0;
-  std::int32_t first = 0;
-  std::int32_t last = 0;
-  friend auto operator<=>(const RowSpan&, const RowSpan&) = default;
-};
-
-std::int32_t grid_index(double coordinate_um) {
-  CHECK(std::abs(coordinate_um) < kCoordinateMax_um);
-  const auto truncated = static_cast<std::int32_t>(coordinate_um);
-  return static_cast<double>(truncated) > coordinate_um ? truncated - 1 : truncated;
-}
-
-/// A footprint is convex: the centres inside it in one row are those from the first to the last that it contains.
-void add_spans(const Body& body, std::vector<RowSpan>& spans) {
-  const Vec2 half_um = body.footprint_half_extent_um();
-  const Vec3& centre_um = body.centre_um();
-  // One more on every side: the extent and the containment test round differently.
-  const std::int32_t left = grid_index(centre_um.x() - half_um.x()) - 1,
-                     right = grid_index(centre_um.x() + half_um.x()) + 1;
-  const std::int32_t bottom = grid_index(centre_um.y() - half_um.y()) - 1,
-                     top = grid_index(centre_um.y() + half_um.y()) + 1;
-  for (std::int32_t row = bottom; row <= top; ++row) {
-    const double y_um = static_cast<double>(row) + 0.5;
-    const auto inside = [&](std::int32_t column) {
-      return body.footprint_contains(static_cast<double>(column) + 0.5, y_um);
-    };
-    std::int32_t first = left, last = right;
-    while (first <= last && !inside(first)) ++first;
-    while (last > first && !inside(last)) --last;
-    if (first <= last) spans.push_back({row, first, last});
-  }
-}
+constexpr double kUnitsPerUm3 = 16'777'216.0;  // 2^24
+constexpr double kVolumeMax_um3 = 16'777'216.0;
 
 /// Grid cells in the union. Spans, not a bitmap: the memory follows the cells, however far apart they lie.
 std::uint64_t union_area_um2(const Colony& colony) {
@@ -67,7 +32,55 @@ std::uint64_t union_area_um2(const Colony& colony) {
   return area_um2;
 }
 
+/// What follows from the counts of `row`, the volumes and the area.
+void complete(SeriesRow& row, const VolumeSums& volumes, std::uint64_t area_um2) {
+  row.volume_mean_um3 = volumes.mean_um3();
+  row.volume_sd_um3 = volumes.sd_um3();
+  row.area_um2 = static_cast<double>(area_um2);
+  row.radius_um = std::sqrt(row.area_um2 / maths::kPi);
+  // Bodies too small to hold the centre of any grid cell have no area here, and then no density.
+  if (row.area_um2 > 0.0) row.density_per_mm2 = static_cast<double>(row.cell_count) / row.area_um2 * kUm2PerMm2;
+}
+
 }  // namespace
+
+std::uint64_t VolumeSums::units_of(double volume_um3) {
+  CHECK(volume_um3 >= 0.0 && volume_um3 < kVolumeMax_um3);
+  return static_cast<std::uint64_t>(volume_um3 * kUnitsPerUm3 + 0.5);
+}
+
+void VolumeSums::add(double volume_um3) {
+  const Wide units = units_of(volume_um3);
+  ++count_;
+  sum_ += units;
+  squares_ += units * units;
+}
+
+void VolumeSums::remove(double volume_um3) {
+  const Wide units = units_of(volume_um3);
+  CHECK(count_ > 0 && sum_ >= units && squares_ >= units * units);
+  --count_;
+  sum_ -= units;
+  squares_ -= units * units;
+}
+
+double VolumeSums::mean_um3() const {
+  if (count_ == 0) return 0.0;
+  return static_cast<double>(sum_) / static_cast<double>(count_) / kUnitsPerUm3;
+}
+
+double VolumeSums::sd_um3() const {
+  if (count_ == 0) return 0.0;
+  // About the whole number m below the mean, sum = n m + r: the sum of (v - m)^2 = squares - m (sum + r) is an exact integer, and
+  // the sum about the mean is that less r^2 / n, with r < n. The subtraction is harmless: each unit of r comes from a cell
+  // that lies at least one unit above m, so r^2 / n is at most r / n of the first term.
+  const Wide m = sum_ / count_;
+  const Wide r = sum_ % count_;
+  const auto about_m = static_cast<double>(squares_ - m * (sum_ + r));
+  const auto rest = static_cast<double>(r);
+  const auto count = static_cast<double>(count_);
+  return std::sqrt((about_m - rest * rest / count) / count) / kUnitsPerUm3;
+}
 
 SeriesRow measure_series(const Colony& colony, double time_h) {
   SeriesRow row;
@@ -76,24 +89,61 @@ SeriesRow measure_series(const Colony& colony, double time_h) {
   row.active_count = colony.count(Activity::kActive);
   row.passive_count = colony.count(Activity::kPassive);
   row.senescent_count = colony.count(Activity::kSenescent);
-  if (row.cell_count == 0) return row;
+  VolumeSums volumes;
+  for (const Cell& cell : colony.cells()) volumes.add(cell.volume_um3);
+  complete(row, volumes, union_area_um2(colony));
+  return row;
+}
 
-  // In id order, in two passes: the same bits wherever it runs, and no cancellation.
-  const auto count = static_cast<double>(row.cell_count);
-  double sum_um3 = 0.0;
-  for (const Cell& cell : colony.cells()) sum_um3 += cell.volume_um3;
-  row.volume_mean_um3 = sum_um3 / count;
-  double squares = 0.0;
-  for (const Cell& cell : colony.cells()) {
-    const double difference_um3 = cell.volume_um3 - row.volume_mean_um3;
-    squares += difference_um3 * difference_um3;
+SeriesTracker::SeriesTracker(const Colony& colony) : noise_(colony.noise()), last_seq_(colony.last_seq()) {
+  for (const Cell& cell : colony.cells()) put(colony, cell.id);
+  count_activities(colony);
+}
+
+void SeriesTracker::put(const Colony& colony, CellId id) {
+  const Cell& cell = colony.cell(id);
+  const std::size_t index = id.value - std::size_t{1};
+  CHECK(index <= kept_.size());
+  if (index == kept_.size()) {
+    kept_.emplace_back();
+  } else {
+    const Kept& before = kept_[index];
+    // The footprint is that of the smooth ellipsoid: the noise offset does not matter.
+    coverage_.remove(Body({before.centre_um, before.semiaxes_um, before.rotation_rad, Vec3::Zero()}, noise_));
+    volumes_.remove(before.volume_um3);
   }
-  row.volume_sd_um3 = std::sqrt(squares / count);
+  kept_[index] = {cell.centre_um, cell.semiaxes_um, cell.rotation_rad, cell.volume_um3};
+  coverage_.add(colony.body(id));
+  volumes_.add(cell.volume_um3);
+}
 
-  row.area_um2 = static_cast<double>(union_area_um2(colony));
-  row.radius_um = std::sqrt(row.area_um2 / maths::kPi);
-  // Bodies too small to hold the centre of any grid cell have no area here, and then no density.
-  if (row.area_um2 > 0.0) row.density_per_mm2 = count / row.area_um2 * kUm2PerMm2;
+void SeriesTracker::count_activities(const Colony& colony) {
+  active_count_ = colony.count(Activity::kActive);
+  passive_count_ = colony.count(Activity::kPassive);
+  senescent_count_ = colony.count(Activity::kSenescent);
+}
+
+void SeriesTracker::follow(const Event& event, const Colony& colony) {
+  CHECK(event.seq == last_seq_ + 1 && colony.last_seq() == event.seq);
+  last_seq_ = event.seq;
+  if (const auto* founded = std::get_if<Founded>(&event.body)) {
+    put(colony, founded->cell.id);
+  } else if (const auto* divided = std::get_if<Divided>(&event.body)) {
+    for (const Cell& cell : divided->cells) put(colony, cell.id);
+  } else if (const auto* moved = std::get_if<Moved>(&event.body)) {
+    put(colony, moved->cell.id);
+  }
+  count_activities(colony);
+}
+
+SeriesRow SeriesTracker::row(double time_h) const {
+  SeriesRow row;
+  row.time_h = time_h;
+  row.cell_count = kept_.size();
+  row.active_count = active_count_;
+  row.passive_count = passive_count_;
+  row.senescent_count = senescent_count_;
+  complete(row, volumes_, coverage_.area_um2());
   return row;
 }
 

@@ -7,27 +7,36 @@
 namespace colony::server::api {
 namespace {
 
-// Preset `paper`, as this engine grows it: a colony doubles each cycle up to about 12 cells; from then on sqrt(cells)
-// grows by about 0.75 a cycle (12 cells at 50 h, 61 at 120 h, 314 at 275 h, 1,000 at 503 h). Confluent cells stand at
-// about 0.009 per um2. The generation limit g ends a lone colony near (0.81 g)^2 cells (about 1,060 for g = 40). A
-// division takes 2.4 searches on average.
-constexpr double kCellsExponential = 12.0;
-constexpr double kRootGain = 0.75;
-constexpr double kCellsPerGeneration = 0.81;
-constexpr double kDensity_per_um2 = 0.009;
-constexpr double kWallPerSearch_s = 2.0e-3;  // at the evaluations and points of preset `paper`
-constexpr double kSearchesPerCell = 2.4;
-constexpr double kEvaluations = 32.0 * 8.0 * 256.0;
-constexpr double kMemoryPerCell = 1500.0, kMemoryBase = 30e6;
-constexpr double kStoredPerCell = 3000.0;
-// Of a move tried: it looks at the surroundings of its neighbours and is stored with its cell, made or not. A colony of linear radius
-// has a third of its last cells on average.
-constexpr double kWallPerMove_s = 0.25e-3, kStoredPerMove = 500.0, kMeanOfLastCells = 1.0 / 3.0;
+/// What is measured, and nothing else: to recalibrate, grow preset `paper` and put the new figures here.
+struct Calibration {
+  // The law of growth: a colony doubles each cycle up to about so many cells; from then on sqrt(cells) gains so much a cycle
+  // (12 cells at 50 h, 61 at 120 h, 314 at 275 h, 1,000 at 503 h). The generation limit g ends a lone colony near
+  // (share g)^2 cells (about 1,060 for g = 40). Confluent cells stand this dense.
+  double cells_exponential = 12.0;
+  double root_gain_per_cycle = 0.75;
+  double root_cells_per_generation = 0.81;
+  double density_per_um2 = 0.009;
+  // colony-bench, one thread: searches_per_division; wall_s / divisions / searches_per_division at the evaluations (candidate
+  // pairs times points) that a search of preset `paper` is allowed by the formula below.
+  double searches_per_cell = 2.4;
+  double wall_per_search_s = 0.18e-3;
+  double evaluations_per_search = 32.0 * 8.0 * 256.0;
+  double evaluations_share_min = 0.1;  // a search of no evaluations has this part of the cost all the same
+  // A move tried looks at its neighbours' surroundings, and is stored with its cell, made or not.
+  double wall_per_move_s = 30e-6;
+  double stored_per_move_bytes = 500.0;
+  // Peak memory of colonyd, and database_MB of colony-service-bench.
+  double memory_base_bytes = 30e6;
+  double memory_per_cell_bytes = 1500.0;
+  double stored_per_cell_bytes = 1500.0;
+};
+constexpr Calibration kMeasured;
 
 double cells_of_colony(double cycles) {
-  const double exponential_cycles = std::log2(kCellsExponential);
+  const double exponential_cycles = std::log2(kMeasured.cells_exponential);
   if (cycles <= exponential_cycles) return std::exp2(cycles);
-  const double root = std::sqrt(kCellsExponential) + kRootGain * (cycles - exponential_cycles);
+  const double root =
+      std::sqrt(kMeasured.cells_exponential) + kMeasured.root_gain_per_cycle * (cycles - exponential_cycles);
   return root * root;
 }
 
@@ -39,10 +48,12 @@ Estimate estimate(const RunSpec& spec) {
                                                           : static_cast<double>(p.founders.positions_um.size());
   double ceiling = static_cast<double>(spec.until.cells.value_or(std::uint64_t{1} << 32));
   if (p.dish.radius_um)
-    ceiling = std::min(ceiling, std::numbers::pi * *p.dish.radius_um * *p.dish.radius_um * kDensity_per_um2);
+    ceiling = std::min(ceiling, std::numbers::pi * *p.dish.radius_um * *p.dish.radius_um * kMeasured.density_per_um2);
   if (p.division.generation_limit) {
     const double limit = static_cast<double>(*p.division.generation_limit);
-    const double inhibited = std::max(kCellsExponential, kCellsPerGeneration * kCellsPerGeneration * limit * limit);
+    const double inhibited =
+        std::max(kMeasured.cells_exponential,
+                 kMeasured.root_cells_per_generation * kMeasured.root_cells_per_generation * limit * limit);
     ceiling = std::min(ceiling,
                        founders * (p.division.inhibition ? std::min(std::exp2(limit), inhibited) : std::exp2(limit)));
   }
@@ -61,11 +72,13 @@ Estimate estimate(const RunSpec& spec) {
   out.cells = static_cast<std::uint64_t>(std::llround(cells));
   const double generations = static_cast<double>(p.search.generations + p.search.corrector_generations);
   const double evaluations = static_cast<double>(p.search.population * p.search.points) * (1.0 + generations / 2.0);
-  out.wall_s = cells * kSearchesPerCell * kWallPerSearch_s * std::max(0.1, evaluations / kEvaluations);
-  const double moves = p.motility.rate_per_h * out.time_h * cells * kMeanOfLastCells;
-  out.wall_s += moves * kWallPerMove_s;
-  out.memory_bytes = static_cast<std::uint64_t>(kMemoryBase + cells * kMemoryPerCell);
-  out.stored_bytes = static_cast<std::uint64_t>(cells * kStoredPerCell + moves * kStoredPerMove);
+  // A colony of linear radius has a third of its last cells on average.
+  const double moves = p.motility.rate_per_h * out.time_h * cells / 3.0;
+  out.wall_s = cells * kMeasured.searches_per_cell * kMeasured.wall_per_search_s *
+                   std::max(kMeasured.evaluations_share_min, evaluations / kMeasured.evaluations_per_search) +
+               moves * kMeasured.wall_per_move_s;
+  out.memory_bytes = static_cast<std::uint64_t>(kMeasured.memory_base_bytes + cells * kMeasured.memory_per_cell_bytes);
+  out.stored_bytes = static_cast<std::uint64_t>(cells * kMeasured.stored_per_cell_bytes + moves * kMeasured.stored_per_move_bytes);
   out.basis =
       "growth law of preset paper (doubling, then linear radius) scaled by cycle.mean_h; fixed cost per search on one "
       "core of 2024; expect a factor of three either way, more for unusual models";

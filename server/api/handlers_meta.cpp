@@ -50,6 +50,7 @@ http::Response get_service_info(Context& context, const Call&) {
                              {"version", config.version},
                              {"limits",
                               {{"jobs_concurrent_max", config.jobs.concurrent_max},
+                               {"jobs_threads_per_job", config.jobs.threads_per_job},
                                {"jobs_queued_max", config.jobs.queued_max},
                                {"cells_max", config.jobs.cells_max},
                                {"events_max", config.jobs.events_max},

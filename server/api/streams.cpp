@@ -4,14 +4,24 @@
 #include <stdexcept>
 #include <utility>
 
+#include "server/api/event_text.hpp"
+
 namespace colony::server::api {
 namespace {
 
 constexpr auto kNoTail = [](const std::optional<std::string>&) { return std::string(); };
 
 template <class Item>
-ListFormat<Item> lines_format(Json (*encode)(const Item&)) {
-  return {"", "", [encode](std::string& out, const Item& item) { out += to_text(encode(item)) + '\n'; }, kNoTail};
+using AppendText = void (*)(std::string& out, const Item& item);
+
+template <class Item>
+ListFormat<Item> lines_format(AppendText<Item> append) {
+  return {"", "",
+          [append](std::string& out, const Item& item) {
+            append(out, item);
+            out += '\n';
+          },
+          kNoTail};
 }
 
 template <class Item>
@@ -23,32 +33,31 @@ ListFormat<Item> csv_format(std::span<const Column<Item>> columns) {
 
 // {<facts>, "items": [...], "next": ...}
 template <class Item>
-ListFormat<Item> envelope_format(const Json& facts, Json (*encode)(const Item&)) {
+ListFormat<Item> envelope_format(const Json& facts, AppendText<Item> append) {
   std::string head = to_text(facts);
   head.pop_back();
   head += facts.empty() ? "\"items\":[" : ",\"items\":[";
-  return {head, ",", [encode](std::string& out, const Item& item) { out += to_text(encode(item)); },
-          [](const std::optional<std::string>& next) {
+  return {head, ",", append, [](const std::optional<std::string>& next) {
             return "],\"next\":" + (next ? to_text(Json(*next)) : std::string("null")) + "}";
           }};
 }
 
 template <class Item>
-ListFormat<Item> format_for(std::string_view media, const Json& facts, Json (*encode)(const Item&),
+ListFormat<Item> format_for(std::string_view media, const Json& facts, AppendText<Item> append,
                             std::span<const Column<Item>> columns) {
   if (media == "text/csv") return csv_format(columns);
-  if (media == "application/x-ndjson") return lines_format(encode);
-  return envelope_format(facts, encode);
+  if (media == "application/x-ndjson") return lines_format<Item>(append);
+  return envelope_format<Item>(facts, append);
 }
 
 }  // namespace
 
 ListFormat<Event> event_format(std::string_view media) {
-  return format_for(media, Json::object(), &encode_event, event_columns());
+  return format_for(media, Json::object(), &append_event_text, event_columns());
 }
 
 ListFormat<Cell> cell_format(std::string_view media, const Json& facts) {
-  return format_for(media, facts, &encode_cell, cell_columns());
+  return format_for(media, facts, &append_cell_text, cell_columns());
 }
 
 EventListSource::EventListSource(JobService& jobs, std::string id, EventFilter filter, std::optional<std::size_t> limit,
@@ -63,29 +72,27 @@ EventListSource::EventListSource(JobService& jobs, std::string id, EventFilter f
 http::BodySource::Pull EventListSource::pull(std::string& out) {
   if (is_first_) out += format_.head;
   std::optional<std::string> next;
+  const auto read = [this](std::size_t limit) {
+    auto more = jobs_.events(id_, filter_, limit);
+    if (!more) throw std::runtime_error("events of a list that had begun: " + more.error().message);
+    page_ = std::move(*more);
+    used_ = 0;
+  };
   while (!page_.empty()) {
-    std::size_t used = 0;
-    for (; used < page_.size() && out.size() < kPieceBytes && left_ != std::size_t{0}; ++used) {
+    for (; used_ < page_.size() && out.size() < kPieceBytes && left_ != std::size_t{0}; ++used_) {
       if (!std::exchange(is_first_, false)) out += format_.separator;
-      format_.append(out, page_[used]);
-      filter_.after = page_[used].seq;
+      format_.append(out, page_[used_]);
+      filter_.after = page_[used_].seq;
       if (left_) --*left_;
     }
-    page_.erase(page_.begin(), page_.begin() + static_cast<std::ptrdiff_t>(used));
     if (left_ == std::size_t{0}) {
       // The limit is reached: there is a next page if one more event is stored already.
-      if (page_.empty()) {
-        auto more = jobs_.events(id_, filter_, 1);
-        if (!more) throw std::runtime_error("events of a list that had begun: " + more.error().message);
-        page_ = std::move(*more);
-      }
+      if (used_ == page_.size()) read(1);
       if (!page_.empty()) next = std::to_string(filter_.after);
       break;
     }
-    if (!page_.empty()) return Pull::kMore;  // the piece is full
-    auto more = jobs_.events(id_, filter_, kEventsPerRead);
-    if (!more) throw std::runtime_error("events of a list that had begun: " + more.error().message);
-    page_ = std::move(*more);
+    if (used_ < page_.size()) return Pull::kMore;  // the piece is full
+    read(kEventsPerRead);
     if (!page_.empty() && out.size() >= kPieceBytes) return Pull::kMore;
   }
   out += format_.tail(next);
@@ -114,6 +121,13 @@ http::BodySource::Pull LogSource::pull(std::string& out) {
   if (!more) throw std::runtime_error("the log of a list that had begun: " + more.error().message);
   page_ = std::move(*more);
   return page_.empty() ? Pull::kEnd : Pull::kMore;
+}
+
+void append_event_message(std::string& out, const Event& event) {
+  ((out += "event: ") += name_of(event.kind())) += "\nid: ";
+  (out += std::to_string(event.seq)) += "\ndata: ";
+  append_event_text(out, event);
+  out += "\n\n";
 }
 
 EventStream::EventStream(JobService& jobs, const JobView& view, StreamWish wish, Clock clock)
@@ -148,20 +162,19 @@ http::BodySource::Pull EventStream::pull(std::string& out) {
   // Deleted while it was watched, or the storage failed: without `event: end` the reader reconnects and is told.
   if (!view) return Pull::kEnd;
   if (wish_.events) {
-    if (page_.empty()) {
+    if (next_ == page_.size()) {
       auto events = jobs_.events(id_, wish_.filter, kEventsPerRead);
       if (!events) return Pull::kEnd;
       page_ = std::move(*events);
+      next_ = 0;
     }
-    if (!page_.empty()) {
-      std::size_t used = 0;
-      for (; used < page_.size() && out.size() < kPieceBytes; ++used) {
-        const Event& event = page_[used];
-        out += "event: " + std::string(name_of(event.kind())) + "\nid: " + std::to_string(event.seq) +
-               "\ndata: " + to_text(encode_event(event)) + "\n\n";
-        wish_.filter.after = event.seq;
-      }
-      page_.erase(page_.begin(), page_.begin() + static_cast<std::ptrdiff_t>(used));
+    // A page that is not full is all there was. Nothing more need be asked after it: what comes later wakes.
+    const bool is_last_page = page_.size() < kEventsPerRead;
+    for (; next_ < page_.size() && out.size() < kPieceBytes; ++next_) {
+      append_event_message(out, page_[next_]);
+      wish_.filter.after = page_[next_].seq;
+    }
+    if (!is_last_page || next_ < page_.size()) {
       if (wish_.progress) append_progress(out, *view, false);
       return Pull::kMore;
     }

@@ -52,6 +52,7 @@ class EventListSource : public http::BodySource {
   std::optional<std::size_t> left_;  // of the limit
   const ListFormat<Event> format_;
   std::vector<Event> page_;
+  std::size_t used_ = 0;  // of page_
   bool is_first_ = true;
 };
 
@@ -86,6 +87,9 @@ struct StreamWish {
   bool progress = true;
 };
 
+/// One event of a history as a server-sent message.
+void append_event_message(std::string& out, const Event& event);
+
 /// Server-sent events of one job.
 class EventStream : public http::BodySource {
  public:
@@ -106,7 +110,8 @@ class EventStream : public http::BodySource {
   StreamWish wish_;  // filter.after moves on with every page
   const Clock clock_;
   std::unique_ptr<JobService::Subscription> subscription_;
-  std::vector<Event> page_;  // read, and not yet sent
+  std::vector<Event> page_;  // read;
+  std::size_t next_ = 0;     // from here on not yet sent
   bool is_first_ = true;
   std::string last_progress_;
   std::optional<JobState> last_state_;  // as said in it

@@ -114,17 +114,12 @@ Result<std::vector<SeriesRow>> Past::series(const JobRow& job, std::size_t point
   std::vector<SeriesRow> rows;
   try {
     Colony colony(spec->params);
-    std::optional<SeriesRow> measured;  // of the colony as it is now
-    const auto add_row = [&] {
-      throw_if_stopped(&stop_);
-      if (!measured) measured = measure_series(colony, 0.0);
-      measured->time_h = time_of(rows.size());
-      rows.push_back(*measured);
-    };
+    SeriesTracker tracker(colony);
+    const auto add_row = [&] { rows.push_back(tracker.row(time_of(rows.size()))); };
     const Status folded = for_each_event(store_, &stop_, job.job_key, 0, job.last_seq, [&](const Event& event) {
       while (rows.size() < count && time_of(rows.size()) < event.time_h) add_row();
       colony.apply(event);
-      if (event.kind() != EventKind::kFinished) measured.reset();
+      tracker.follow(event, colony);
     });
     if (!folded) return folded.error();
     while (rows.size() < count) add_row();

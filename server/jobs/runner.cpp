@@ -57,7 +57,6 @@ class Run {
   RunEnd end_from_outside(JobState state, FinishReason reason, const std::string& detail);
   RunEnd fail_as_stored(const std::string& reason, FinishReason finish_reason, const std::string& detail);
   void take(Event event);
-  void measure_if_due();
   void append();
   void settle_commits();
   JobRow reread();
@@ -70,10 +69,9 @@ class Run {
   const std::shared_ptr<LiveJob> live_;
   JobRow tail_;  // the row as it will be when everything taken is committed
   std::unique_ptr<Simulator> simulator_;
-  std::uint64_t founders_ = 0;
-  std::uint64_t next_hour_ = 0;        // first whole model hour without a series row
-  std::optional<SeriesRow> measured_;  // of the colony as it is now
-  std::vector<Event> events_;          // taken, not yet given to the store
+  std::optional<SeriesTracker> tracker_;  // at the event that was taken last; there once stored events are folded
+  std::uint64_t next_hour_ = 0;           // first whole model hour without a series row
+  std::vector<Event> events_;             // taken, not yet given to the store
   std::vector<SeriesRow> series_;
   Clock::time_point batch_since_{};
   const std::shared_ptr<Commits> commits_ = std::make_shared<Commits>();
@@ -116,9 +114,9 @@ RunEnd Run::begin() {
   if (!spec)
     return fail_as_stored("internal", FinishReason::kInternal,
                           "the stored spec cannot be used: " + spec.error().message);
-  founders_ = founder_count(spec->params.founders);
-  simulator_ = std::make_unique<Simulator>(std::move(*spec), live_->stop_flag());
+  simulator_ = std::make_unique<Simulator>(std::move(*spec), live_->stop_flag(), env_.config.threads_per_job);
   if (tail_.last_seq > 0 && !replay()) return stop(live_->wish());
+  tracker_.emplace(simulator_->colony());
   return grow();
 }
 
@@ -150,7 +148,6 @@ RunEnd Run::grow() {
   for (;;) {
     commits_->check();
     if (const LiveJob::Wish wish = live_->wish(); wish != LiveJob::Wish::kNone) return stop(wish);
-    measure_if_due();
     std::optional<Event> event;
     try {
       const FailureContext context("deciding event " + std::to_string(tail_.last_seq + 1) + " of job " + tail_.id);
@@ -177,29 +174,15 @@ RunEnd Run::grow() {
   }
 }
 
-/// A row belongs to the last state at or before its hour, and the next event destroys that state: measure before it is decided,
-/// where the agenda says that it will jump over the hour.
-void Run::measure_if_due() {
-  const Agenda& agenda = simulator_->agenda();
-  if (measured_ || tail_.last_seq < founders_ || agenda.empty()) return;
-  if (agenda.first().due_h > static_cast<double>(next_hour_)) measured_ = measure_series(simulator_->colony(), 0.0);
-}
-
 void Run::take(Event event) {
   const Colony& colony = simulator_->colony();
   const bool finished = event.kind() == EventKind::kFinished;
   const auto passed = [&](std::uint64_t hour) {
     return static_cast<double>(hour) < event.time_h || (finished && static_cast<double>(hour) == event.time_h);
   };
-  if (passed(next_hour_)) {
-    if (finished && !measured_) measured_ = measure_series(colony, 0.0);  // `finished` changes no cell
-    CHECK(measured_.has_value());
-    for (; passed(next_hour_); ++next_hour_) {
-      measured_->time_h = static_cast<double>(next_hour_);
-      series_.push_back(*measured_);
-    }
-  }
-  measured_.reset();
+  // A row belongs to the last state at or before its hour. This event has destroyed that state; the tracker still holds it.
+  for (; passed(next_hour_); ++next_hour_) series_.push_back(tracker_->row(static_cast<double>(next_hour_)));
+  tracker_->follow(event, colony);
   tail_.last_seq = event.seq;
   tail_.time_h = event.time_h;
   tail_.digest = event.digest;
@@ -207,7 +190,10 @@ void Run::take(Event event) {
   tail_.active_count = colony.count(Activity::kActive);
   tail_.passive_count = colony.count(Activity::kPassive);
   tail_.senescent_count = colony.count(Activity::kSenescent);
-  if (events_.empty()) batch_since_ = Clock::now();
+  if (events_.empty()) {
+    events_.reserve(kBatchEvents);
+    batch_since_ = Clock::now();
+  }
   events_.push_back(std::move(event));
 }
 

@@ -1,4 +1,6 @@
 // The threads of LocalJobService: runners that take jobs, and one that brings back jobs stopped by the store.
+#include <pthread.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -20,6 +22,7 @@ LocalJobService::~LocalJobService() { drain(); }
 
 Status LocalJobService::start() {
   if (config_.concurrent_max < 1) return Error{ErrorCode::kInvalid, "jobs.concurrent_max must be 1 or more"};
+  if (config_.threads_per_job < 1) return Error{ErrorCode::kInvalid, "jobs.threads_per_job must be 1 or more"};
   auto running = store_.running_jobs();
   if (!running) return running.error();
   JobFilter paused;
@@ -99,6 +102,7 @@ Result<std::pair<JobRow, std::shared_ptr<LiveJob>>> LocalJobService::take() {
 }
 
 void LocalJobService::run_loop() {
+  pthread_setname_np(pthread_self(), "runner");  // as operators see it, per thread; the engine's threads inherit it
   for (;;) {
     std::uint64_t nudges = 0;
     {

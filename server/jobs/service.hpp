@@ -19,7 +19,8 @@
 namespace colony::server {
 
 struct JobsConfig {
-  std::size_t concurrent_max = 1;          // colonies growing at a time
+  std::size_t concurrent_max = 1;          // colonies growing at a time,
+  int threads_per_job = 1;                 // and the threads on which each decides; no history depends on it
   std::size_t queued_max = 1000;
   std::uint64_t cells_max = 1'000'000;     // per job; beyond: failed, reason "limit"
   std::uint64_t events_max = 50'000'000;   // per job; beyond: failed, reason "limit"

@@ -20,23 +20,39 @@ void Statement::check(int code) const {
 }
 
 Statement& Statement::bind(std::int64_t value) {
+  is_clean_ = false;
   check(sqlite3_bind_int64(statement_.get(), next_++, value));
   return *this;
 }
 
 Statement& Statement::bind(double value) {
+  is_clean_ = false;
   check(sqlite3_bind_double(statement_.get(), next_++, value));
   return *this;
 }
 
 Statement& Statement::bind(std::string_view value) {
+  is_clean_ = false;
   // An empty view may have no address, which SQLite would take for NULL.
   const char* data = value.empty() ? "" : value.data();
   check(sqlite3_bind_text(statement_.get(), next_++, data, static_cast<int>(value.size()), SQLITE_TRANSIENT));
   return *this;
 }
 
+Statement& Statement::bind_lasting(std::string_view value) {
+  is_clean_ = false;
+  check(sqlite3_bind_text(statement_.get(), next_++, value.data(), static_cast<int>(value.size()), SQLITE_STATIC));
+  return *this;
+}
+
+Statement& Statement::bind_lasting_blob(std::span<const std::uint8_t> value) {
+  is_clean_ = false;
+  check(sqlite3_bind_blob(statement_.get(), next_++, value.data(), static_cast<int>(value.size()), SQLITE_STATIC));
+  return *this;
+}
+
 Statement& Statement::bind_null() {
+  is_clean_ = false;
   check(sqlite3_bind_null(statement_.get(), next_++));
   return *this;
 }
@@ -48,11 +64,13 @@ Statement& Statement::bind_text_or_null(const std::string& value) {
 }
 
 Statement& Statement::bind_blob(std::span<const std::uint8_t> value) {
+  is_clean_ = false;
   check(sqlite3_bind_blob(statement_.get(), next_++, value.data(), static_cast<int>(value.size()), SQLITE_TRANSIENT));
   return *this;
 }
 
 bool Statement::step() {
+  is_clean_ = false;
   const int code = sqlite3_step(statement_.get());
   if (code == SQLITE_ROW) return true;
   if (code == SQLITE_DONE) {
@@ -70,6 +88,8 @@ void Statement::run() {
 }
 
 void Statement::reset() {
+  if (is_clean_) return;
+  is_clean_ = true;
   sqlite3_reset(statement_.get());  // repeats the code of the last step, which was reported then
   sqlite3_clear_bindings(statement_.get());
   next_ = 1;

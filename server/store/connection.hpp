@@ -40,10 +40,17 @@ class Statement {
   Statement& bind(std::int64_t value);
   Statement& bind(double value);
   Statement& bind(std::string_view value);  // text; copied
+  Statement& bind_lasting(std::string_view value);  // not empty, not copied: it must stay until the statement has run
   Statement& bind_null();
+  Statement& skip(int count) {  // what is not bound is NULL
+    next_ += count;
+    is_clean_ = false;
+    return *this;
+  }
   Statement& bind(const std::optional<double>& value);
   Statement& bind_text_or_null(const std::string& value);  // empty: NULL
   Statement& bind_blob(std::span<const std::uint8_t> value);
+  Statement& bind_lasting_blob(std::span<const std::uint8_t> value);  // as bind_lasting
 
   /// True if there is a row. After the last row the statement is reset.
   bool step();
@@ -67,6 +74,7 @@ class Statement {
   sqlite3* db_;
   std::unique_ptr<sqlite3_stmt, Finalise> statement_;
   int next_ = 1;
+  bool is_clean_ = true;  // reset since it was last stepped or bound
 };
 
 class Connection {

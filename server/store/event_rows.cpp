@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "engine/base/check.hpp"
+#include "server/store/cell_index.hpp"
 
 namespace colony::server {
 namespace {
@@ -79,9 +80,8 @@ void bind_exact(Statement& to, const Vec3& value) {
   for (int i = 0; i < 3; ++i) bind_exact(to, value[i]);
 }
 
-void bind_nulls(Statement& to, int count) {
-  for (int i = 0; i < count; ++i) to.bind_null();
-}
+// A statement begins with NULL for every parameter.
+void bind_nulls(Statement& to, int count) { to.skip(count); }
 
 Vec3 vector_at(const Statement& row, int column) {
   return {row.real(column), row.real(column + 1), row.real(column + 2)};
@@ -106,7 +106,7 @@ void write_placement(Connection& connection, std::int64_t job_key, std::int64_t 
   } else {
     to.bind_null();
   }
-  to.bind(std::int64_t{cell.generation}).bind(std::int64_t{cell.ordinal}).bind(name_of(cell.activity));
+  to.bind(std::int64_t{cell.generation}).bind(std::int64_t{cell.ordinal}).bind_lasting(name_of(cell.activity));
   bind_exact(to, cell.centre_um);
   bind_exact(to, cell.nucleus_um);
   bind_exact(to, cell.nucleus_radius_um);
@@ -211,7 +211,7 @@ struct BindBody {
   void operator()(const Senesced&) const { bind_nulls(to, 24); }
   void operator()(const Finished& finished) const {
     bind_nulls(to, 22);
-    to.bind(name_of(finished.reason)).bind(signed_of(finished.cell_count));
+    to.bind_lasting(name_of(finished.reason)).bind(signed_of(finished.cell_count));
   }
 };
 
@@ -297,13 +297,13 @@ void write_event(Connection& connection, std::int64_t job_key, const Event& even
   Statement& to = connection.prepared(kInsertEvent);
   to.bind(job_key).bind(seq);
   bind_exact(to, event.time_h);
-  to.bind(name_of(event.kind()));
+  to.bind_lasting(name_of(event.kind()));
   if (event.cell_id) {
     to.bind(std::int64_t{event.cell_id->value});
   } else {
     to.bind_null();
   }
-  to.bind_blob(event.digest.bytes);
+  to.bind_lasting_blob(event.digest.bytes);
   std::visit(BindBody{to}, event.body);
   to.run();
   if (const auto* founded = std::get_if<Founded>(&event.body)) {
@@ -337,9 +337,7 @@ std::vector<Event> read_events(Connection& connection, std::int64_t job_key, con
     sql += ")";
   }
   if (filter.cell_id) {
-    sql +=
-        " AND seq IN (SELECT seq FROM event WHERE job_key = ?1 AND cell_id = ?4 AND seq > ?2"
-        " UNION SELECT seq FROM placement WHERE job_key = ?1 AND cell_id = ?4 AND seq > ?2)";
+    sql += std::string(" AND seq IN (") + kSeqsOfCell + ")";
   }
   sql += " ORDER BY seq LIMIT ?3";
   constexpr auto kMax = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());

@@ -5,6 +5,7 @@
 
 #include "engine/base/check.hpp"
 #include "engine/base/version.hpp"
+#include "server/store/cell_index.hpp"
 #include "server/store/identity.hpp"
 
 namespace colony::server {
@@ -224,6 +225,7 @@ bool sweep_deleted(Connection& connection, std::int64_t seqs) {
     }
     return true;
   }
+  if (sweep_cell_index(connection, job_key)) return true;
   for (const char* sql : {"DELETE FROM series WHERE job_key = ?", "DELETE FROM job_log WHERE job_key = ?",
                           "DELETE FROM job WHERE job_key = ?"}) {
     connection.prepared(sql).bind(job_key).run();

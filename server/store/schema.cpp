@@ -6,6 +6,7 @@
 namespace colony::server {
 namespace {
 
+constexpr int kWriterCache_KiB = 65'536;
 constexpr std::int64_t kApplicationId = 0x436F6C79;  // "Coly"
 
 // Histories are clustered by (job_key, seq): a page of events is one range of one tree. No foreign keys: a big history is
@@ -142,7 +143,24 @@ CREATE TABLE job_log (
 INSERT INTO meta VALUES ('cursor_salt', random()), ('writable_probe', 0);
 )sql";
 
-constexpr std::array<const char*, 1> kMigrations = {kVersion1};  // kMigrations[v] leads from version v to v + 1
+// Two indexes by cell become one table that is written in large sorted pieces (cell_index.hpp).
+constexpr const char* kVersion2 = R"sql(
+DROP INDEX event_by_cell;
+DROP INDEX placement_by_cell;
+CREATE TABLE cell_event (
+  job_key INTEGER NOT NULL,
+  cell_id INTEGER NOT NULL,
+  seq INTEGER NOT NULL,
+  PRIMARY KEY (job_key, cell_id, seq)
+) STRICT, WITHOUT ROWID;
+ALTER TABLE job ADD COLUMN indexed_seq INTEGER NOT NULL DEFAULT 0;
+INSERT INTO cell_event SELECT job_key, cell_id, seq FROM
+  (SELECT job_key, cell_id, seq FROM event WHERE cell_id IS NOT NULL UNION SELECT job_key, cell_id, seq FROM placement)
+  ORDER BY job_key, cell_id, seq;
+UPDATE job SET indexed_seq = last_seq;
+)sql";
+
+constexpr std::array<const char*, 2> kMigrations = {kVersion1, kVersion2};  // kMigrations[v] leads from version v to v + 1
 
 std::int64_t pragma(Connection& writer, const char* sql) {
   Statement statement = writer.prepare_once(sql);
@@ -167,6 +185,8 @@ void prepare_database(Connection& writer) {
     throw DbError(SQLITE_CANTOPEN, "the file system allows no write-ahead log");
   mode.reset();
   writer.execute("PRAGMA synchronous = FULL");
+  // What a large job touches again and again (the ends of its tables, the index by cell) stays in memory.
+  writer.execute("PRAGMA cache_size = -" + std::to_string(kWriterCache_KiB));
   for (std::int64_t v = version; v < static_cast<std::int64_t>(kMigrations.size()); ++v) {
     writer.execute("BEGIN IMMEDIATE");
     try {

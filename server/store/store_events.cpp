@@ -4,6 +4,7 @@
 
 #include "engine/base/check.hpp"
 #include "server/store/append.hpp"
+#include "server/store/cell_index.hpp"
 #include "server/store/event_rows.hpp"
 #include "server/store/job_rows.hpp"
 #include "server/store/sqlite_store.hpp"
@@ -25,6 +26,7 @@ Status append_batch(Connection& connection, const EventBatch& batch, JobRow& job
     job.time_h = event.time_h;
     job.digest = event.digest;
   }
+  index_cells_if_due(connection, batch.job_key, job.last_seq);
   for (const SeriesRow& row : batch.series) write_series(connection, batch.job_key, row);
   job.cell_count = batch.cell_count;
   job.active_count = batch.active_count;

@@ -1,5 +1,7 @@
 #include "server/store/writer.hpp"
 
+#include <pthread.h>
+
 #include <algorithm>
 #include <exception>
 #include <future>
@@ -10,7 +12,7 @@
 namespace colony::server {
 namespace {
 constexpr std::size_t kRequestsPerBatch = 256;  // so that a flood of requests cannot starve the events
-constexpr int kCheckpointPages = 1000;          // 4 MB of log
+constexpr int kCheckpointPages = 8000;          // 32 MB of log: a page that is written again and again is moved once
 constexpr int kCheckpointWaitPages = 25'000;    // 100 MB: readers kept the log from restarting for too long
 constexpr std::chrono::seconds kSweepRetry{10};
 
@@ -115,6 +117,7 @@ std::vector<WriteTask> Writer::next_batch(std::unique_lock<std::mutex>& lock) {
 }
 
 void Writer::loop() {
+  pthread_setname_np(pthread_self(), "writer");  // as operators see it, per thread
   std::unique_lock lock(mutex_);
   for (;;) {
     const bool due = !requests_.empty() || urgent_bulk_ > 0 || bulk_rows_ >= limits_.batch_rows_max ||

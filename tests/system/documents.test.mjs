@@ -1,5 +1,6 @@
 // documents: what the server says about itself: OpenAPI, schema, service information, health.
 import assert from 'node:assert/strict';
+import { cpus } from 'node:os';
 import test from 'node:test';
 import Ajv2020 from 'ajv/dist/2020.js';
 import { finishedJob, small } from './harness/jobs.mjs';
@@ -100,6 +101,15 @@ test('documents', async (t) => {
     const { json } = await server.get('/v1/service-info');
     assert.match(JSON.stringify(json), /"version":/);
     for (const word of ['paper', 'clonogenic', 'limits']) assert.ok(JSON.stringify(json).includes(word), word);
+    // Where nothing is said, jobs and their threads share the cores.
+    const { jobs_concurrent_max: jobs, jobs_threads_per_job: threads } = json.limits;
+    assert.ok(jobs >= 1 && threads >= 1 && jobs * threads <= cpus().length, `${jobs} jobs of ${threads} threads`);
+  });
+
+  await t.test('what is said of jobs and threads stands', async () => {
+    const told = await startServer(t, { args: ['--jobs.concurrent-max', '3', '--jobs.threads-per-job', '5'] });
+    const { json } = await told.get('/v1/service-info');
+    assert.deepEqual([json.limits.jobs_concurrent_max, json.limits.jobs_threads_per_job], [3, 5]);
   });
 
   await t.test('healthz and readyz answer 200', async () => {

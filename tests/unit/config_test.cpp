@@ -31,8 +31,8 @@ class ConfigFile {
   std::filesystem::path path_;
 };
 
-Result<Invocation> given(std::vector<std::string> arguments, Environment environment = kHome) {
-  return configure(arguments, environment, "1.2.3");
+Result<Invocation> given(std::vector<std::string> arguments, Environment environment = kHome, std::uint64_t cores = 2) {
+  return configure(arguments, environment, "1.2.3", cores);
 }
 
 std::vector<std::string> places(const Result<Invocation>& result) {
@@ -112,6 +112,46 @@ TEST(Config, WrongFlagsAreErrors) {
   EXPECT_FALSE(given({"--jobs.concurrent-max"}));
   EXPECT_THAT(places(given({"--jobs.concurrent-max", "-1"})).size(), 1u);
   EXPECT_THAT(places(given({"--jobs.concurrent-max", "257"})), ElementsAre("--jobs.concurrent-max"));
+}
+
+TEST(Config, JobsShareTheCoresUnlessToldOtherwise) {
+  const auto shared = [](std::uint64_t cores, std::vector<std::string> arguments) {
+    const auto result = given(std::move(arguments), kHome, cores);
+    return std::pair{result->config.jobs.concurrent_max, result->config.jobs.threads_per_job};
+  };
+  using Pair = std::pair<std::size_t, int>;
+  EXPECT_EQ(shared(1, {}), Pair(1, 1));
+  EXPECT_EQ(shared(2, {}), Pair(1, 2));
+  EXPECT_EQ(shared(6, {}), Pair(1, 4));
+  EXPECT_EQ(shared(8, {}), Pair(2, 4));
+  EXPECT_EQ(shared(64, {}), Pair(16, 4));
+  EXPECT_EQ(shared(8, {"--jobs.concurrent-max", "1"}), Pair(1, 8));
+  EXPECT_EQ(shared(8, {"--jobs.concurrent-max", "3"}), Pair(3, 2));
+  EXPECT_EQ(shared(8, {"--jobs.threads-per-job", "3"}), Pair(2, 3));
+  EXPECT_EQ(shared(2, {"--jobs.threads-per-job", "16"}), Pair(1, 16)) << "what is asked for stands";
+  EXPECT_EQ(shared(2, {"--jobs.concurrent-max", "16"}), Pair(16, 1));
+  EXPECT_EQ(shared(2, {"--jobs.concurrent-max", "5", "--jobs.threads-per-job", "7"}), Pair(5, 7));
+  EXPECT_EQ(shared(0, {}), Pair(1, 1));
+  EXPECT_EQ(shared(100'000, {}), Pair(64, 4)) << "within the ranges of both";
+  for (std::uint64_t cores = 1; cores <= 300; ++cores) {
+    for (const char* argument : {"--limits.cells-max=9", "--jobs.concurrent-max=1", "--jobs.threads-per-job=1"}) {
+      const auto [jobs, threads] = shared(cores, {argument});
+      ASSERT_LE(jobs * static_cast<std::size_t>(threads), cores);
+    }
+  }
+}
+
+TEST(Config, ThreadsPerJobComeFromFileEnvironmentAndFlagWithinTheirRange) {
+  const ConfigFile file("[jobs]\nthreads_per_job = 2\n");
+  Environment environment = kHome;
+  EXPECT_EQ(given({"--config", file.path()}, environment)->config.jobs.threads_per_job, 2);
+  environment.emplace_back("COLONY_JOBS_THREADS_PER_JOB", "3");
+  EXPECT_EQ(given({"--config", file.path()}, environment)->config.jobs.threads_per_job, 3);
+  EXPECT_EQ(given({"--config", file.path(), "--jobs.threads-per-job=5"}, environment)->config.jobs.threads_per_job, 5);
+  for (const char* wrong : {"0", "257", "-1", "two", "1.5"}) {
+    EXPECT_THAT(places(given({std::string("--jobs.threads-per-job=") + wrong})), ElementsAre("--jobs.threads-per-job"))
+        << wrong;
+  }
 }
 
 TEST(Config, OnlyLoopbackIsListenedOn) {

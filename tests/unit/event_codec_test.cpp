@@ -9,9 +9,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "engine/base/check.hpp"
 #include "server/api/codec_event.hpp"
 #include "server/api/codec_model.hpp"
+#include "server/api/event_text.hpp"
 #include "server/api/schema.hpp"
+#include "tests/support/sample_events.hpp"
+#include "tests/support/scale.hpp"
 #include "tests/unit/api_support.hpp"
 
 namespace colony::server::api {
@@ -118,6 +122,67 @@ TEST(EventJson, EveryNumberRoundTrips) {
     }
   }
   EXPECT_TRUE(seen[0] && seen[1] && seen[3] && seen[6]);
+}
+
+/// Names, order and every number of the text are those of the codec.
+void expect_same(const std::string& text, const Json& json) {
+  const auto read = parse_json(text);
+  ASSERT_TRUE(read) << read.error().message << " in " << text;
+  EXPECT_EQ(to_text(*read), to_text(*parse_json(to_text(json))));
+}
+
+TEST(EventText, IsTheCodecsJson) {
+  const server::testing::FakeJobs jobs;
+  std::vector<Event> events = tests::events_of_every_kind();
+  events.insert(events.end(), jobs.history.begin(), jobs.history.end());
+  for (const Event& event : events) {
+    std::string text;
+    append_event_text(text, event);
+    expect_same(text, encode_event(event));
+    EXPECT_EQ(text.find('\n'), std::string::npos) << "one line in a stream";
+    if (const auto* founded = std::get_if<Founded>(&event.body)) {
+      std::string cell;
+      append_cell_text(cell, founded->cell);
+      expect_same(cell, encode_cell(founded->cell));
+    }
+  }
+}
+
+TEST(EventText, IsTheCodecsJsonForAnyNumbers) {
+  // Every bit pattern is as likely: all exponents, whole numbers too.
+  std::uint64_t state = 88172645463325252ULL;
+  const auto next = [&] {
+    for (;;) {
+      state ^= state << 13;
+      state ^= state >> 7;
+      state ^= state << 17;
+      const double value = state % 5 == 0 ? static_cast<double>(state >> 40) : std::bit_cast<double>(state);
+      if (std::isfinite(value)) return value + 0.0;
+    }
+  };
+  for (int i = 0; i < colony::testing::scaled(2000, 50'000); ++i) {
+    Event event = tests::sample_event(state >> 11, Settled{});
+    Settled settled;
+    settled.nucleus_um = {next(), next(), next()};
+    settled.nearest_membrane_um = {next(), next(), next()};
+    settled.deformed_volume_um3 = next();
+    settled.due_h = next();
+    event.time_h = next();
+    event.body = settled;
+    std::string text;
+    append_event_text(text, event);
+    expect_same(text, encode_event(event));
+    const Json read = *parse_json(text);
+    for (int k = 0; k < 3; ++k) ASSERT_TRUE(same_bits(read["nucleus_um"][k], settled.nucleus_um[k])) << text;
+    ASSERT_TRUE(read["time_h"].is_number_float()) << "a double looks like one: " << text;
+  }
+}
+
+TEST(EventText, RefusesWhatJsonCannotSay) {
+  Event event = tests::sample_event(1, Senesced{});
+  event.time_h = std::nan("");
+  std::string text;
+  EXPECT_THROW(append_event_text(text, event), CheckFailure);
 }
 
 TEST(EventJson, InhibitedCarriesItsSearch) {

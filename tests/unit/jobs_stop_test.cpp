@@ -155,9 +155,13 @@ TEST_F(JobsTest, KeptColoniesAreBoundedByTheirCells) {
   EXPECT_FALSE(is_kept(small));  // and came back for it
 }
 
-TEST_F(JobsTest, NoRunnersIsAnError) {
+TEST_F(JobsTest, NoRunnersOrNoThreadsIsAnError) {
   JobsConfig config;
   config.concurrent_max = 0;
+  open(config);
+  EXPECT_EQ(service_->start().error().code, ErrorCode::kInvalid);
+  config.concurrent_max = 1;
+  config.threads_per_job = 0;
   open(config);
   EXPECT_EQ(service_->start().error().code, ErrorCode::kInvalid);
 }

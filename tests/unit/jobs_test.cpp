@@ -33,6 +33,16 @@ TEST_F(JobsTest, GrowsToItsBound) {
   }
 }
 
+TEST_F(JobsTest, TheNumberOfThreadsDoesNotShowInTheHistory) {
+  JobsConfig config;
+  config.threads_per_job = 3;
+  open(config);
+  start();
+  const std::string id = submit(new_job(1, 20));
+  Watch(*service_, id).until_ended();
+  EXPECT_EQ(events(id), undisturbed(1, 20));
+}
+
 TEST_F(JobsTest, TwoJobsAtOnceDoNotTouchEachOther) {
   JobsConfig config;
   config.concurrent_max = 2;

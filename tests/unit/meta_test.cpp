@@ -24,6 +24,8 @@ TEST(Meta, ServiceInfoSchemaAndOpenapi) {
   EXPECT_EQ(facts["parameters"].size(), param_table().size());
   EXPECT_EQ(facts["presets"][0]["name"], "paper");
   EXPECT_EQ(facts["limits"]["json_depth_max"], 32);
+  EXPECT_EQ(facts["limits"]["jobs_concurrent_max"], 1);
+  EXPECT_EQ(facts["limits"]["jobs_threads_per_job"], 1);
   auto schema = fixture.get("/v1/schema/job", {{"Accept", "application/schema+json"}});
   EXPECT_EQ(json_of(schema)["$schema"], "https://json-schema.org/draft/2020-12/schema");
 
