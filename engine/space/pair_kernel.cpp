@@ -83,7 +83,7 @@ PairScore score_pair_reference(const SearchScene& scene, const std::array<Candid
       const float wx = x - scene.wall_x;
       const float wy = y - scene.wall_y;
       if (scene.has_wall && wx * wx + wy * wy > scene.wall_radius2) score.beyond_wall = true;
-      if (is_inside_reference(pair[1 - k].field, x, y, z)) {
+      if (smooth_reference(pair[1 - k].field, x, y, z) >= 0.0F) {
         ++score.sibling[k];
         ++score.shared[k];
       }
