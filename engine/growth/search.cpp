@@ -6,6 +6,9 @@
 #include <tuple>
 #include <utility>
 
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
 #include "engine/base/check.hpp"
 #include "engine/space/overlap.hpp"
 
@@ -21,6 +24,7 @@ std::array<std::uint32_t, 3> seeds_for(const SearchTask& task, Purpose purpose, 
 }
 
 constexpr double kGiveUpMarginLast = 0.02;
+constexpr std::size_t kPointsWorthThreads = 65'536;   // of a generation: 100 us
 
 double share_left(std::uint32_t hits, std::uint32_t shared) {
   return shared >= hits ? 0.0 : static_cast<double>(hits - shared) / static_cast<double>(hits);
@@ -93,22 +97,31 @@ class Scorer {
     racing_ = best > 0.0;
   }
 
-  /// On the points of the search. Below the best if it was given up.
-  double score(const Chromosome& chromosome) {
-    ws_.genes.decode(chromosome, task_.frame, ws_.candidate);
-    const kernel::ShareLimit limit = racing_ ? kernel::ShareLimit(ws_.most_shared) : kernel::ShareLimit();
-    cover(std::max(ws_.candidate[0].reach, ws_.candidate[1].reach));
-    const kernel::PairScore score = kernel::score_pair(ws_.scene, ws_.candidate, limit, ws_.overlap.work);
-    if (score.beyond_wall) return 0.0;
-    double fitness = 1.0;
-    for (std::size_t k = 0; k < 2; ++k) {
-      if (score.hits[k] == 0 && score.dropped) continue;  // not looked at
-      fitness = std::min(fitness, share_left(score.hits[k], score.shared[k]));
+  /// Scores every candidate without a score, on the points of the search. One that is given up gets a fitness below the best.
+  void score_all(std::vector<Candidate>& candidates) {
+    std::size_t count = 0;
+    for (const Candidate& candidate : candidates) count += candidate.fitness < 0.0 ? 1 : 0;
+    if (ws_.threads == 1 || !is_worth_threads(count)) {
+      for (Candidate& candidate : candidates) {
+        if (candidate.fitness < 0.0) candidate.fitness = score(candidate.chromosome, ws_.candidate, ws_.overlap.work);
+      }
+      return;
     }
-    if (score.dropped || !(fitness > 0.0) || !(params_.contact.neighbour_retained_min > 0.0)) return fitness;
-    const Pair pair = decode(chromosome, task_.frame, params_);
-    const std::array<Body, 2> bodies = {Body(pair.bodies[0], params_.noise), Body(pair.bodies[1], params_.noise)};
-    return neighbours_keep_enough(bodies) ? fitness : 0.0;
+    // The voxels are filled first, for all of them: then scoring changes nothing but its own slot, and a slot's value does not depend on who
+    // scores it or when. Isolated: a thread that waits here must not begin another event.
+    for (const Candidate& candidate : candidates) {
+      ws_.genes.decode(candidate.chromosome, task_.frame, ws_.candidate);
+      cover(std::max(ws_.candidate[0].reach, ws_.candidate[1].reach));
+    }
+    ws_.work_of.assign(candidates.size(), {});
+    tbb::this_task_arena::isolate([&] {
+      tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t i) {
+        if (!(candidates[i].fitness < 0.0)) return;
+        std::array<kernel::CandidateBody, 2> bodies = ws_.candidate;
+        candidates[i].fitness = score(candidates[i].chromosome, bodies, ws_.work_of[i]);
+      });
+    });
+    for (const kernel::CountWork& work : ws_.work_of) ws_.overlap.work += work;
   }
 
   /// On the fresh points, by the definition.
@@ -137,6 +150,30 @@ class Scorer {
   }
 
  private:
+  // About 1.5 ns a point of the search and candidate; asking neighbours what they keep costs far more. Handing work to a thread costs some
+  // microseconds: at the defaults (32 candidates of 256 points, 10 us) it would only cost.
+  bool is_worth_threads(std::size_t candidate_count) const {
+    return candidate_count > 1 && (params_.contact.neighbour_retained_min > 0.0 ||
+                                   candidate_count * static_cast<std::size_t>(params_.search.points) >= kPointsWorthThreads);
+  }
+
+  double score(const Chromosome& chromosome, std::array<kernel::CandidateBody, 2>& candidate, kernel::CountWork& work) {
+    ws_.genes.decode(chromosome, task_.frame, candidate);
+    const kernel::ShareLimit limit = racing_ ? kernel::ShareLimit(ws_.most_shared) : kernel::ShareLimit();
+    cover(std::max(candidate[0].reach, candidate[1].reach));
+    const kernel::PairScore score = kernel::score_pair(ws_.scene, candidate, limit, work);
+    if (score.beyond_wall) return 0.0;
+    double fitness = 1.0;
+    for (std::size_t k = 0; k < 2; ++k) {
+      if (score.hits[k] == 0 && score.dropped) continue;  // not looked at
+      fitness = std::min(fitness, share_left(score.hits[k], score.shared[k]));
+    }
+    if (score.dropped || !(fitness > 0.0) || !(params_.contact.neighbour_retained_min > 0.0)) return fitness;
+    const Pair pair = decode(chromosome, task_.frame, params_);
+    const std::array<Body, 2> bodies = {Body(pair.bodies[0], params_.noise), Body(pair.bodies[1], params_.noise)};
+    return neighbours_keep_enough(bodies) ? fitness : 0.0;
+  }
+
   // Puts into the voxels every neighbour that a body of this reach can meet.
   void cover(float reach_um) {
     // The margin is for rounding alone.
@@ -200,10 +237,8 @@ class Search {
   // he cannot beat it. The best used for that is never one of the generation in flight, so the order of scoring cannot matter.
   void evaluate(std::vector<Candidate>& candidates, std::size_t first) {
     throw_if_stopped(stop_);
-    for (std::size_t i = first; i < candidates.size(); ++i) {
-      ++evaluation_count_;
-      if (candidates[i].fitness < 0.0) candidates[i].fitness = scorer_.score(candidates[i].chromosome);
-    }
+    evaluation_count_ += static_cast<std::uint32_t>(candidates.size() - first);
+    scorer_.score_all(candidates);
     // The first with the highest fitness.
     std::size_t best = 0;
     for (std::size_t i = 1; i < candidates.size(); ++i) {
