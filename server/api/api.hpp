@@ -109,6 +109,7 @@ http::Response delete_job(Context& context, const Call& call);
 http::Response get_events(Context& context, const Call& call);
 http::Response get_cells(Context& context, const Call& call);
 http::Response get_series(Context& context, const Call& call);
+http::Response get_lineage(Context& context, const Call& call);
 http::Response get_image(Context& context, const Call& call);
 http::Response get_log(Context& context, const Call& call);
 http::Response get_job_schema(Context& context, const Call& call);

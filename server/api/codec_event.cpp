@@ -121,6 +121,7 @@ Json encode_job(const JobView& view) {
             {"cells", self + "/cells"},
             {"series", self + "/series"},
             {"image", self + "/image"},
+            {"lineage", self + "/lineage"},
             {"log", self + "/log"}}}};
 }
 

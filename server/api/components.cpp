@@ -119,7 +119,27 @@ Json job_schema() {
        {"progress", reference("Progress")},
        {"links",
         strict_object(
-            {{"self", path}, {"events", path}, {"cells", path}, {"series", path}, {"image", path}, {"log", path}})}});
+            {{"self", path}, {"events", path}, {"cells", path}, {"series", path}, {"image", path}, {"lineage", path},
+             {"log", path}})}});
+}
+
+Json lineage_schema() {
+  const Json parent = {{"type", Json::array({"integer", "null"})}, {"minimum", 1}, {"maximum", kCellIdMax}};
+  Json born_h = typed("number");
+  born_h["description"] = "when the id came into being: placed, or split off its parent";
+  Json daughters = {{"type", "array"}, {"items", cell_id()}};
+  daughters["description"] = "one for each division of this id, in the order of time";
+  Json item = strict_object({{"cell_id", cell_id()},
+                             {"parent_id", parent},
+                             {"born_h", std::move(born_h)},
+                             {"generation", count()},
+                             {"activity", names_upto(Activity::kSenescent)},
+                             {"daughter_ids", std::move(daughters)}});
+  return strict_object({{"time_h", typed("number")},
+                        {"last_seq", count()},
+                        {"digest", digest()},
+                        {"items", {{"type", "array"}, {"items", std::move(item)}}},
+                        {"next", typed("null")}});
 }
 
 Json progress_schema() {
@@ -216,6 +236,7 @@ Json component_schemas(const SpecLimits& limits) {
                                   {"digest", digest()},
                                   {"items", list_of("Cell")},
                                   {"next", typed("null")}})},
+      {"Lineage", lineage_schema()},
       {"Woken", strict_object({{"cell_id", cell_id()}, {"free_share", typed("number")}, {"due_h", typed("number")}})},
       {"Event", event_union()},
       {"EventList", page_of("Event", {{"type", Json::array({"string", "null"})}, {"pattern", "^[0-9]+$"}})},

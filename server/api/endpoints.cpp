@@ -157,6 +157,17 @@ std::vector<Endpoint> make_endpoints() {
        get_series,
        true},
       {"GET",
+       "/v1/jobs/{job_id}/lineage",
+       "showLineage",
+       "Who came from whom: a table, or Newick trees (one a founder; leaves named by cell id, branch lengths in h)",
+       {kJson, "text/x-newick", "text/plain"},
+       {kAtH},
+       {{200, "the lineage"}},
+       "Lineage",
+       {kNotFound, kTimeNotReached},
+       get_lineage,
+       true},
+      {"GET",
        "/v1/jobs/{job_id}/image",
        "drawImage",
        "A picture of the colony from above",
@@ -275,8 +286,8 @@ Api::Api(JobService& jobs, ApiConfig config) {
 void Api::add_routes(http::Router& router) {
   for (const Endpoint& endpoint : endpoints()) {
     std::string pattern(endpoint.path);
-    if (const std::size_t open = pattern.find('{'); open != std::string::npos) {
-      pattern.replace(open, pattern.find('}') - open + 1, "{}");
+    for (std::size_t open = pattern.find('{'); open != std::string::npos; open = pattern.find('{', open + 1)) {
+      pattern.replace(open, pattern.find('}', open) - open + 1, "{}");
     }
     router.add(std::string(endpoint.method), pattern,
                [&endpoint, context = context_.get()](const http::Request& request) {

@@ -5,6 +5,7 @@
 #include "engine/picture/render.hpp"
 #include "server/api/api.hpp"
 #include "server/api/codec_event.hpp"
+#include "server/api/lineage.hpp"
 #include "server/api/streams.hpp"
 
 namespace colony::server::api {
@@ -120,6 +121,18 @@ http::Response get_series(Context& context, const Call& call) {
   Json items = Json::array();
   for (const SeriesRow& row : *rows) items.push_back(encode_row(series_columns(), row));
   return json_response(200, {{"items", std::move(items)}, {"next", nullptr}});
+}
+
+http::Response get_lineage(Context& context, const Call& call) {
+  auto at = context.jobs.colony_at(call.id(), call.query.number("at_h"));
+  if (!at) return failure(at.error(), call);
+  auto lineage = read_lineage(context.jobs, call.id(), at->colony->last_seq(), &context.draining);
+  if (!lineage) return failure(lineage.error(), call);
+  if (call.media != "application/json") {
+    return streamed(call.media, std::make_unique<NewickSource>(std::move(*lineage), at->time_h));
+  }
+  const Json facts = {{"time_h", at->time_h}, {"last_seq", at->colony->last_seq()}, {"digest", at->digest.hex()}};
+  return streamed(call.media, std::make_unique<LineageTableSource>(std::move(*lineage), at->colony, facts));
 }
 
 http::Response get_image(Context& context, const Call& call) {
