@@ -24,6 +24,7 @@ Result<DecodedImage> decode_jpeg(std::string_view bytes, const DecodeLimits& lim
   int width = 0, height = 0, subsampling = 0, colours = 0;
   if (tjDecompressHeader3(handle.get(), data, bytes.size(), &width, &height, &subsampling, &colours) != 0)
     return failed();
+  if (width < 1 || height < 1) return malformed("damaged or cut-off JPEG: it ends before it states its size");
   if (colours == TJCS_CMYK || colours == TJCS_YCCK)
     return not_read("a JPEG in CMYK is not read: save it in grey or RGB");
   const bool grey = colours == TJCS_GRAY;
