@@ -16,7 +16,7 @@ packages=(
   libspdlog-dev libtomlplusplus-dev                          # server
   libcli11-dev libcurl4-openssl-dev                          # client
   libgtest-dev libgmock-dev librapidcheck-dev libbenchmark-dev   # tests
-  clang-16 libclang-rt-16-dev libfuzzer-16-dev   # tests/fuzz (SIZE to fetch; clang-14 cannot compile the <ranges> of this libstdc++)
+  clang-16 libclang-rt-16-dev libfuzzer-16-dev   # tests/fuzz (46 MB to fetch; clang-14 cannot compile the <ranges> of this libstdc++)
 )
 
 # The system tests need Node 18 or later; one from elsewhere is as good as Debian's and is left alone.

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <new>
-#include <tuple>
 #include <opencv2/core.hpp>
+#include <tuple>
 
 namespace colony {
 namespace {
@@ -55,7 +55,7 @@ Result<GreyImage> grey_of(const DecodedImage& image, std::optional<std::int64_t>
   return grey;
 }
 
-Result<ImageAnalysis> analyse_image(std::string_view bytes, const AnalysisOptions& options) try {
+Result<ImageAnalysis> analyse_image(std::string_view bytes, const AnalysisOptions& options, StopFlag stop) try {
   if (options.um_per_px &&
       !(*options.um_per_px >= kImageScaleMin_um_per_px && *options.um_per_px <= kImageScaleMax_um_per_px)) {
     return wrong("um_per_px", "must be between 0.001 and 10000");
@@ -80,7 +80,7 @@ Result<ImageAnalysis> analyse_image(std::string_view bytes, const AnalysisOption
   grey->um_per_px = options.um_per_px;
   result.um_per_px = options.um_per_px;
 
-  Result<Segmentation> segmentation = segment(*grey, options.segment);
+  Result<Segmentation> segmentation = segment(*grey, options.segment, stop);
   if (!segmentation) return segmentation.error();
   result.segmentation = std::move(*segmentation);
   const Segmentation& found = result.segmentation;

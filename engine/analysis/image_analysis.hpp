@@ -1,7 +1,8 @@
 // image_analysis: a picture file of a microscope to what was counted in it.
 // Method:  decode.hpp, then one channel as 8 bits, then segment.hpp.
 // Units:   um where um_per_px is given, else pixels; a scale that the file states is reported, never used unasked: files often state a printer's.
-// Limits:  DecodeLimits for the file; both sides at most kImageSideMax_px. Peak memory: the samples, and about 40 bytes a pixel with every step kept.
+// Limits:  DecodeLimits for the file; both sides at most kImageSideMax_px. Peak memory: the samples, then about 50 bytes a pixel with every step kept:
+//          1.7 GB for the 32 Mi pixels that are taken unless the caller says otherwise.
 // Errors:  those of decode_image and segment; kInvalid (fields `channel`, `um_per_px`).     Threads: pure, any thread.
 #pragma once
 
@@ -17,7 +18,7 @@ struct AnalysisOptions {
   std::optional<std::int64_t> channel =
       {};  // from 0; none: grey as it is, RGB as luma; an image of several channels needs one
   SegmentOptions segment = {};
-  DecodeLimits limits = {};
+  DecodeLimits limits = {.pixels_max = 32LL << 20};
 };
 
 struct ImageMetadata {
@@ -46,8 +47,8 @@ struct ImageAnalysis {
   std::optional<double> density_per_mm2;  // objects in the field
 };
 
-/// What a click on "analyse" does, and what each of its steps looked like. `bytes` must stay until it returns.
-Result<ImageAnalysis> analyse_image(std::string_view bytes, const AnalysisOptions& options);
+/// What a click on "analyse" does, and what each of its steps looked like. `bytes` must stay until it returns. Throws Stopped when asked to.
+Result<ImageAnalysis> analyse_image(std::string_view bytes, const AnalysisOptions& options, StopFlag stop = nullptr);
 
 /// One channel (or the luma of RGB, by integer weights 299, 587, 114) as 8 bits. 8-bit samples stay as they are; 16-bit samples are stretched from their
 /// 0.1 % to their 99.9 % level, which `metadata` then names.

@@ -1,7 +1,6 @@
 #include "engine/analysis/segment.hpp"
 
 #include <algorithm>
-#include <functional>
 
 #include "engine/analysis/filters.hpp"
 #include "engine/analysis/split.hpp"
@@ -250,7 +249,7 @@ StepImage overlay(const GreyImage& image, const LabelImage& labels) {
   return step;
 }
 
-Result<Segmentation> segment(const GreyImage& image, const SegmentOptions& options) {
+Result<Segmentation> segment(const GreyImage& image, const SegmentOptions& options, StopFlag stop) {
   if (Status status = check_options(image, options); !status) return status.error();
   const Look look = look_at(image);
   if (look.level_count < 2) {
@@ -286,6 +285,7 @@ Result<Segmentation> segment(const GreyImage& image, const SegmentOptions& optio
     const int level = options.threshold.value_or(otsu(signal, result.pipeline == Pipeline::kPhase ? 37 : 0));
     if (level < 0) return wrong("image", "after the background is taken away nothing is left in it");
     result.threshold = level;
+    throw_if_stopped(stop);
     Objects objects = objects_at(signal, level, result.pipeline, options);
     steps.add("threshold", "above level " + std::to_string(level) + (result.threshold_given ? " (given)" : " (Otsu)"),
               objects.raw);
@@ -307,6 +307,7 @@ Result<Segmentation> segment(const GreyImage& image, const SegmentOptions& optio
     for (std::int64_t k = -kSweepSide; k <= kSweepSide; ++k) {
       const std::int64_t at = level + k * kSweepStep;
       if (at < 0 || at > 254) continue;
+      throw_if_stopped(stop);
       const Objects other = k == 0 ? Objects{} : objects_at(signal, static_cast<int>(at), result.pipeline, options);
       const std::vector<std::int64_t>& areas = k == 0 ? result.areas_px : other.areas_px;
       std::int64_t sum = 0;

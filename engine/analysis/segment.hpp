@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "engine/analysis/image.hpp"
+#include "engine/base/stop.hpp"
 
 namespace colony {
 
@@ -71,7 +72,8 @@ struct Segmentation {
   std::vector<StepImage> steps;
 };
 
-Result<Segmentation> segment(const GreyImage& image, const SegmentOptions& options);
+/// Throws Stopped when asked to, between steps.
+Result<Segmentation> segment(const GreyImage& image, const SegmentOptions& options, StopFlag stop = nullptr);
 
 /// The picture with the outlines of the objects over it, each in one of six colours by its number.
 StepImage overlay(const GreyImage& image, const LabelImage& labels);

@@ -28,7 +28,8 @@ int main(int argc, char** argv) {
   for (const int bits : {1, 2, 4, 8, 16}) {
     for (const int type : {0, 2, 3, 4, 6}) {
       const int channels[] = {1, 0, 3, 1, 2, 0, 4};
-      PngSpec spec{static_cast<std::uint8_t>(type), static_cast<std::uint8_t>(bits), static_cast<std::uint8_t>(bits == 8 ? 1 : 0)};
+      PngSpec spec{static_cast<std::uint8_t>(type), static_cast<std::uint8_t>(bits),
+                   static_cast<std::uint8_t>(bits == 8 ? 1 : 0)};
       if (type == 3) spec.palette = std::vector<spng_plte_entry>(2, spng_plte_entry{10, 20, 30, 255});
       const std::vector<std::uint8_t> rows(static_cast<std::size_t>((9 * channels[type] * bits + 7) / 8 * 5), 0);
       if (const std::string file = png_file(9, 5, spec, rows); !file.empty()) write(top / "png", file);
@@ -48,9 +49,13 @@ int main(int argc, char** argv) {
     }
   }
   write(top / "tiff", tiff_file({gradient(9, 5, 1, 255)}, {.photometric = PHOTOMETRIC_PALETTE}));
-  write(top / "tiff", tiff_file({gradient(9, 5, 4, 255)}, {.photometric = PHOTOMETRIC_RGB, .big_endian = true, .big_tiff = true, .alpha = EXTRASAMPLE_ASSOCALPHA}));
+  write(top / "tiff",
+        tiff_file(
+            {gradient(9, 5, 4, 255)},
+            {.photometric = PHOTOMETRIC_RGB, .big_endian = true, .big_tiff = true, .alpha = EXTRASAMPLE_ASSOCALPHA}));
   for (const int channels : {1, 3}) {
-    for (const bool progressive : {false, true}) write(top / "jpeg", jpeg_file(gradient(17, 9, channels, 255), 60, progressive));
+    for (const bool progressive : {false, true})
+      write(top / "jpeg", jpeg_file(gradient(17, 9, channels, 255), 60, progressive));
   }
   return 0;
 }

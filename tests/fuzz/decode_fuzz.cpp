@@ -15,9 +15,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   limits.samples_bytes_max = 4 << 20;
   Result<DecodedImage> result = [&] {
     switch (ImageFormat::COLONY_FUZZ_FORMAT) {
-      case ImageFormat::kPng: return decode_parts::decode_png(bytes, limits);
-      case ImageFormat::kTiff: return decode_parts::decode_tiff(bytes, limits);
-      default: return decode_parts::decode_jpeg(bytes, limits);
+      case ImageFormat::kPng:
+        return decode_parts::decode_png(bytes, limits);
+      case ImageFormat::kTiff:
+        return decode_parts::decode_tiff(bytes, limits);
+      default:
+        return decode_parts::decode_jpeg(bytes, limits);
     }
   }();
   if (!result) {

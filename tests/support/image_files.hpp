@@ -7,11 +7,11 @@
 #include <cstdlib>
 #include <cstring>
 #include <string>
+#include <tiffio.h>
+#include <turbojpeg.h>
 #include <vector>
 
 #include <spng.h>
-#include <tiffio.h>
-#include <turbojpeg.h>
 
 namespace colony::testing {
 
@@ -34,7 +34,8 @@ inline Picture16 gradient(int width, int height, int channels, std::uint32_t val
 inline std::vector<std::uint8_t> as_bytes(const std::vector<std::uint16_t>& samples, int bits) {
   std::vector<std::uint8_t> bytes(samples.size() * static_cast<std::size_t>(bits / 8));
   if (bits == 16) std::memcpy(bytes.data(), samples.data(), bytes.size());
-  if (bits == 8) for (std::size_t i = 0; i < samples.size(); ++i) bytes[i] = static_cast<std::uint8_t>(samples[i]);
+  if (bits == 8)
+    for (std::size_t i = 0; i < samples.size(); ++i) bytes[i] = static_cast<std::uint8_t>(samples[i]);
   return bytes;
 }
 
@@ -83,12 +84,12 @@ struct TiffSpec {
   std::uint16_t compression = COMPRESSION_NONE;
   std::uint16_t photometric = PHOTOMETRIC_MINISBLACK;
   bool planar = false;
-  int tile = 0;            // side; 0: strips
+  int tile = 0;  // side; 0: strips
   int rows_per_strip = 3;
   bool predictor = false;
   bool big_endian = false;
   bool big_tiff = false;
-  int alpha = -1;          // EXTRASAMPLE_...; -1: the further channels are unspecified
+  int alpha = -1;  // EXTRASAMPLE_...; -1: the further channels are unspecified
   float per_centimetre = 0.0F;
   std::string description = {};
 };
@@ -100,21 +101,25 @@ struct File {
 };
 inline tmsize_t read(thandle_t handle, void* to, tmsize_t size) {
   auto& file = *static_cast<File*>(handle);
-  const std::size_t count = std::min(static_cast<std::size_t>(size), file.bytes.size() - std::min(file.bytes.size(), file.position));
+  const std::size_t count =
+      std::min(static_cast<std::size_t>(size), file.bytes.size() - std::min(file.bytes.size(), file.position));
   std::memcpy(to, file.bytes.data() + file.position, count);
   file.position += count;
   return static_cast<tmsize_t>(count);
 }
 inline tmsize_t write(thandle_t handle, void* from, tmsize_t size) {
   auto& file = *static_cast<File*>(handle);
-  if (file.position + static_cast<std::size_t>(size) > file.bytes.size()) file.bytes.resize(file.position + static_cast<std::size_t>(size));
+  if (file.position + static_cast<std::size_t>(size) > file.bytes.size())
+    file.bytes.resize(file.position + static_cast<std::size_t>(size));
   std::memcpy(file.bytes.data() + file.position, from, static_cast<std::size_t>(size));
   file.position += static_cast<std::size_t>(size);
   return size;
 }
 inline toff_t seek(thandle_t handle, toff_t offset, int whence) {
   auto& file = *static_cast<File*>(handle);
-  file.position = static_cast<std::size_t>(offset) + (whence == SEEK_CUR ? file.position : whence == SEEK_END ? file.bytes.size() : 0);
+  file.position = static_cast<std::size_t>(offset) + (whence == SEEK_CUR   ? file.position
+                                                      : whence == SEEK_END ? file.bytes.size()
+                                                                           : 0);
   return file.position;
 }
 inline int close(thandle_t) { return 0; }
@@ -137,7 +142,8 @@ inline std::string tiff_file(const std::vector<Picture16>& pages, const TiffSpec
     TIFFSetField(tiff, TIFFTAG_PLANARCONFIG, spec.planar ? PLANARCONFIG_SEPARATE : PLANARCONFIG_CONTIG);
     const int extra = page.channels - (spec.photometric == PHOTOMETRIC_RGB ? 3 : 1);
     if (extra > 0) {
-      const std::vector<std::uint16_t> kinds(static_cast<std::size_t>(extra), static_cast<std::uint16_t>(std::max(0, spec.alpha)));
+      const std::vector<std::uint16_t> kinds(static_cast<std::size_t>(extra),
+                                             static_cast<std::uint16_t>(std::max(0, spec.alpha)));
       TIFFSetField(tiff, TIFFTAG_EXTRASAMPLES, extra, kinds.data());
     }
     if (spec.photometric == PHOTOMETRIC_PALETTE) {
@@ -157,7 +163,8 @@ inline std::string tiff_file(const std::vector<Picture16>& pages, const TiffSpec
     }
     if (!spec.description.empty()) TIFFSetField(tiff, TIFFTAG_IMAGEDESCRIPTION, spec.description.c_str());
     const int planes = spec.planar ? page.channels : 1, block_channels = spec.planar ? 1 : page.channels;
-    const int block_width = spec.tile > 0 ? spec.tile : page.width, block_height = spec.tile > 0 ? spec.tile : spec.rows_per_strip;
+    const int block_width = spec.tile > 0 ? spec.tile : page.width,
+              block_height = spec.tile > 0 ? spec.tile : spec.rows_per_strip;
     if (spec.tile > 0) {
       TIFFSetField(tiff, TIFFTAG_TILEWIDTH, spec.tile);
       TIFFSetField(tiff, TIFFTAG_TILELENGTH, spec.tile);
@@ -174,13 +181,15 @@ inline std::string tiff_file(const std::vector<Picture16>& pages, const TiffSpec
             for (int x = 0; x < block_width && left + x < page.width; ++x) {
               for (int c = 0; c < block_channels; ++c) {
                 samples[static_cast<std::size_t>((y * block_width + x) * block_channels + c)] =
-                    page.samples[static_cast<std::size_t>(((top + y) * page.width + left + x) * page.channels + plane + c)];
+                    page.samples[static_cast<std::size_t>(((top + y) * page.width + left + x) * page.channels + plane +
+                                                          c)];
               }
             }
           }
           std::vector<std::uint8_t> bytes = as_bytes(samples, spec.bits);
           const auto size = static_cast<tmsize_t>(bytes.size());
-          spec.tile > 0 ? TIFFWriteEncodedTile(tiff, block, bytes.data(), size) : TIFFWriteEncodedStrip(tiff, block, bytes.data(), size);
+          spec.tile > 0 ? TIFFWriteEncodedTile(tiff, block, bytes.data(), size)
+                        : TIFFWriteEncodedStrip(tiff, block, bytes.data(), size);
         }
       }
     }

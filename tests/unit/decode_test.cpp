@@ -52,7 +52,8 @@ TEST(DecodePng, GreyAndRgbOf8And16BitsInterlacedOrNotComeBackAsMade) {
 TEST(DecodePng, FewBitsAreSpreadAndPalettesLookedUp) {
   EXPECT_EQ(read(png_file(8, 1, {SPNG_COLOR_TYPE_GRAYSCALE, 1}, {0b10110001})).samples,
             (std::vector<std::uint16_t>{255, 0, 255, 255, 0, 0, 0, 255}));
-  EXPECT_EQ(read(png_file(4, 1, {SPNG_COLOR_TYPE_GRAYSCALE, 2}, {0b00011011})).samples, (std::vector<std::uint16_t>{0, 85, 170, 255}));
+  EXPECT_EQ(read(png_file(4, 1, {SPNG_COLOR_TYPE_GRAYSCALE, 2}, {0b00011011})).samples,
+            (std::vector<std::uint16_t>{0, 85, 170, 255}));
   const PngSpec indexed{SPNG_COLOR_TYPE_INDEXED, 8, 0, {{10, 20, 30, 255}, {200, 100, 50, 255}}};
   const DecodedImage image = read(png_file(3, 1, indexed, {1, 0, 1}));
   EXPECT_EQ(image.model, ColourModel::kRgb);
@@ -84,20 +85,24 @@ TEST(DecodePng, ThePixelSizeIsReportedInUm) {
 
 TEST(DecodeTiff, EveryLayoutAndCompressionComesBackAsMade) {
   int count = 0;
-  for (const int kind : {COMPRESSION_NONE, COMPRESSION_LZW, COMPRESSION_ADOBE_DEFLATE, COMPRESSION_DEFLATE, COMPRESSION_PACKBITS}) {
+  for (const int kind :
+       {COMPRESSION_NONE, COMPRESSION_LZW, COMPRESSION_ADOBE_DEFLATE, COMPRESSION_DEFLATE, COMPRESSION_PACKBITS}) {
     const auto compression = static_cast<std::uint16_t>(kind);
     for (const int bits : {8, 16}) {
       for (const int channels : {1, 3, 5}) {
         for (const bool planar : {false, true}) {
           for (const int tile : {0, 16}) {
             for (const bool big_endian : {false, true}) {
-              TiffSpec spec{.bits = bits, .compression = compression, .planar = planar, .tile = tile, .big_endian = big_endian};
+              TiffSpec spec{
+                  .bits = bits, .compression = compression, .planar = planar, .tile = tile, .big_endian = big_endian};
               spec.predictor = compression == COMPRESSION_LZW;
               spec.photometric = channels == 3 ? PHOTOMETRIC_RGB : PHOTOMETRIC_MINISBLACK;
               const Picture16 picture = gradient(37, 22, channels, bits == 8 ? 255 : 65535);
               const DecodedImage image = read(tiff_file({picture}, spec));
               expect_same(image, picture, bits);
-              EXPECT_EQ(image.model, channels == 1 ? ColourModel::kGrey : channels == 3 ? ColourModel::kRgb : ColourModel::kChannels);
+              EXPECT_EQ(image.model, channels == 1   ? ColourModel::kGrey
+                                     : channels == 3 ? ColourModel::kRgb
+                                                     : ColourModel::kChannels);
               ++count;
             }
           }
@@ -142,7 +147,9 @@ TEST(DecodeTiff, WhiteIsZeroPaletteAlphaBigTiffAndScale) {
             (std::vector<std::uint16_t>{227, 177, 127}));
   expect_same(read(tiff_file({a}, {.big_tiff = true})), a, 8);
   EXPECT_NEAR(read(tiff_file({a}, {.per_centimetre = 20000.0F})).um_per_px_stated.value_or(0), 0.5, 1e-9);
-  EXPECT_NEAR(read(tiff_file({a}, {.per_centimetre = 4.0F, .description = "ImageJ=1.53\nunit=micron\n"})).um_per_px_stated.value_or(0), 0.25, 1e-9);
+  EXPECT_NEAR(read(tiff_file({a}, {.per_centimetre = 4.0F, .description = "ImageJ=1.53\nunit=micron\n"}))
+                  .um_per_px_stated.value_or(0),
+              0.25, 1e-9);
   EXPECT_FALSE(read(tiff_file({a}, {.per_centimetre = 4.0F, .description = "no unit"})).um_per_px_stated);
 }
 
@@ -151,12 +158,14 @@ TEST(DecodeJpeg, GreyAndRgbComeBackWithinTheirLoss) {
     for (const bool progressive : {false, true}) {
       Picture16 picture{40, 24, channels, {}};
       for (int i = 0; i < 40 * 24; ++i) {
-        for (int c = 0; c < channels; ++c) picture.samples.push_back(static_cast<std::uint16_t>(60 + 3 * (i % 40) + 20 * c));
+        for (int c = 0; c < channels; ++c)
+          picture.samples.push_back(static_cast<std::uint16_t>(60 + 3 * (i % 40) + 20 * c));
       }
       const DecodedImage image = read(jpeg_file(picture, 95, progressive));
       EXPECT_EQ(image.model, channels == 1 ? ColourModel::kGrey : ColourModel::kRgb);
       ASSERT_EQ(image.samples.size(), picture.samples.size());
-      for (std::size_t i = 0; i < image.samples.size(); ++i) ASSERT_NEAR(image.samples[i], picture.samples[i], 4.0) << i;
+      for (std::size_t i = 0; i < image.samples.size(); ++i)
+        ASSERT_NEAR(image.samples[i], picture.samples[i], 4.0) << i;
     }
   }
 }
@@ -168,7 +177,9 @@ struct Refusal {
   std::string message;
 };
 
-std::string with_bytes(std::string file, std::size_t at, const std::string& bytes) { return file.replace(at, bytes.size(), bytes); }
+std::string with_bytes(std::string file, std::size_t at, const std::string& bytes) {
+  return file.replace(at, bytes.size(), bytes);
+}
 
 TEST(DecodeRefuses, EachByName) {
   using std::string_literals::operator""s;
@@ -184,9 +195,11 @@ TEST(DecodeRefuses, EachByName) {
     std::memcpy(bytes.data() + 8, &value, 4);
     return bytes;
   };
-  const auto small_tiff = [&](std::uint32_t width, std::uint32_t height, std::uint32_t bits, std::uint32_t compression) {
-    return "II*\0\x08\0\0\0\x08\0"s + entry(256, 4, 1, width) + entry(257, 4, 1, height) + entry(258, 3, 1, bits) + entry(259, 3, 1, compression) +
-           entry(262, 3, 1, 1) + entry(273, 4, 1, 8) + entry(278, 4, 1, height) + entry(279, 4, 1, 64) + std::string(4, '\0');
+  const auto small_tiff = [&](std::uint32_t width, std::uint32_t height, std::uint32_t bits,
+                              std::uint32_t compression) {
+    return "II*\0\x08\0\0\0\x08\0"s + entry(256, 4, 1, width) + entry(257, 4, 1, height) + entry(258, 3, 1, bits) +
+           entry(259, 3, 1, compression) + entry(262, 3, 1, 1) + entry(273, 4, 1, 8) + entry(278, 4, 1, height) +
+           entry(279, 4, 1, 64) + std::string(4, '\0');
   };
   const std::vector<Refusal> refusals = {
       {"nothing", "", ErrorCode::kMalformed, "empty"},
@@ -201,7 +214,8 @@ TEST(DecodeRefuses, EachByName) {
       {"a TIFF cut before its directory", tiff.substr(0, 100), ErrorCode::kMalformed, "TIFF"},
       {"a TIFF of its first bytes", tiff.substr(0, 4), ErrorCode::kMalformed, "TIFF"},
       {"a TIFF of a million x a million", small_tiff(1'000'000, 1'000'000, 8, 1), ErrorCode::kLimit, "at most 50000"},
-      {"a TIFF of 4e9 x 4e9", small_tiff(4'000'000'000, 4'000'000'000, 8, 1), ErrorCode::kMalformed, "TIFF"},  // libtiff's own sums overflow
+      {"a TIFF of 4e9 x 4e9", small_tiff(4'000'000'000, 4'000'000'000, 8, 1), ErrorCode::kMalformed,
+       "TIFF"},  // libtiff's own sums overflow
       {"a TIFF of 50,000 x 50,000", small_tiff(50'000, 50'000, 8, 1), ErrorCode::kLimit, "at most 67108864"},
       {"a TIFF of 8,000 x 8,000 in 110 bytes", small_tiff(8'000, 8'000, 8, 1), ErrorCode::kMalformed, "can hold"},
       {"the same deflated", small_tiff(8'000, 8'000, 8, 8), ErrorCode::kMalformed, "can hold"},
@@ -232,13 +246,15 @@ TEST(DecodeRefuses, APngOrJpegThatStatesTooMuchBeforeItsPixelsAreLookedAt) {
   EXPECT_EQ(decode_image(png, limits).error().code, ErrorCode::kLimit);
   limits = {};
   limits.channels_max = 2;
-  EXPECT_EQ(decode_image(tiff_file({gradient(4, 4, 3, 255)}, {.photometric = PHOTOMETRIC_RGB}), limits).error().code, ErrorCode::kLimit);
+  EXPECT_EQ(decode_image(tiff_file({gradient(4, 4, 3, 255)}, {.photometric = PHOTOMETRIC_RGB}), limits).error().code,
+            ErrorCode::kLimit);
 }
 
 TEST(DecodeRefuses, EveryCutOfAFileIsAnErrorOrTheWholeImage) {
   // A TIFF's directory may stand at its end, a PNG's last chunk holds no pixels: what counts is that nothing is half read.
   const Picture16 picture = gradient(19, 11, 1, 255);
-  for (const std::string& file : {grey_png(19, 11), tiff_file({picture}, {}), tiff_file({picture}, {.compression = COMPRESSION_LZW})}) {
+  for (const std::string& file :
+       {grey_png(19, 11), tiff_file({picture}, {}), tiff_file({picture}, {.compression = COMPRESSION_LZW})}) {
     for (std::size_t size = 0; size < file.size(); ++size) {
       const Result<DecodedImage> result = decode_image(std::string_view(file).substr(0, size));
       if (result) {
