@@ -271,6 +271,7 @@ Result<Segmentation> segment(const GreyImage& image, const SegmentOptions& optio
     if (result.foreground == Foreground::kAuto)
       result.foreground = 2 * light_px <= result.field_px ? Foreground::kLight : Foreground::kDark;
     result.mask = result.foreground == Foreground::kLight ? std::move(light) : inverted(light);
+    steps.add("threshold", "the ink: what is measured, as it is", result.mask);
     const Pieces found = pieces_of(result.mask);
     result.area_min_px = 1;
     result.labels = renumbered(found.labels, 1, &result.areas_px);
