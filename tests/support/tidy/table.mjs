@@ -29,7 +29,10 @@ export const thirdParty = [
   { prefix: 'nlohmann/', places: ['server/api/', 'client/'] },
   { prefix: 'sqlite3.h', places: ['server/store/'] },
   { prefix: 'SQLiteCpp/', places: ['server/store/'] },
-  { prefix: 'spng.h', places: ['engine/picture/'] },
+  { prefix: 'spng.h', places: ['engine/picture/', 'engine/analysis/'] },
+  { prefix: 'tiffio.h', places: ['engine/analysis/'] },
+  { prefix: 'turbojpeg.h', places: ['engine/analysis/'] },
+  { prefix: 'opencv2/', places: ['engine/analysis/'] },
   { prefix: 'xxhash.h', places: ['engine/base/'] },
   { prefix: 'Random123/', places: ['engine/random/'] },
   { prefix: 'xmmintrin.h', places: ['engine/base/'] },  // the floating-point mode
