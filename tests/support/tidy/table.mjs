@@ -30,6 +30,7 @@ export const thirdParty = [
   { prefix: 'sqlite3.h', places: ['server/store/'] },
   { prefix: 'SQLiteCpp/', places: ['server/store/'] },
   { prefix: 'spng.h', places: ['engine/picture/'] },
+  { prefix: 'opencv2/', places: ['engine/analysis/', 'engine/picture/'] },
   { prefix: 'xxhash.h', places: ['engine/base/'] },
   { prefix: 'Random123/', places: ['engine/random/'] },
   { prefix: 'xmmintrin.h', places: ['engine/base/'] },  // the floating-point mode
