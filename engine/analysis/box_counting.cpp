@@ -58,7 +58,7 @@ inline std::uint32_t mass_of(std::uint32_t value) { return value; }
 
 /// Adds up bands of rows, and counts the boxes of each for every column offset. `Sum` holds the mass of a whole band.
 template <class Sum, class T>
-void run_task(const Raster<T>& image, const PixelBox& part, const Table& table, Task& task) {
+void run_task(const ImageOf<T>& image, const PixelBox& part, const Table& table, Task& task) {
   const auto width = static_cast<std::size_t>(part.width);
   std::vector<Sum> columns(width);
   // prefix[i] = mass of the band's first i columns.
@@ -96,7 +96,7 @@ void run_task(const Raster<T>& image, const PixelBox& part, const Table& table, 
 }
 
 template <class T>
-PixelBox box_of(const Raster<T>& image) {
+PixelBox box_of(const ImageOf<T>& image) {
   std::int64_t left = image.width_px, right = -1, top = -1, bottom = -1;
   for (std::int64_t row = 0; row < image.height_px; ++row) {
     const T* pixels = image.row(row);
@@ -136,7 +136,7 @@ Status check_grid(const BoxGrid& grid, std::int64_t width_px, std::int64_t heigh
 }
 
 template <class T>
-std::uint64_t mass_in(const Raster<T>& image, const PixelBox& part) {
+std::uint64_t mass_in(const ImageOf<T>& image, const PixelBox& part) {
   std::uint64_t mass = 0;
   for (std::int64_t row = part.top; row < part.top + part.height; ++row) {
     const T* pixels = image.row(row) + part.left;
@@ -171,7 +171,7 @@ BoxCount combine(const std::vector<Task>& tasks, std::size_t side_index, std::ui
 }
 
 template <class T>
-Result<std::vector<BoxCount>> count_all(const Raster<T>& image, const BoxGrid& grid, int threads, StopFlag stop) {
+Result<std::vector<BoxCount>> count_all(const ImageOf<T>& image, const BoxGrid& grid, int threads, StopFlag stop) {
   if (const Status shape = check_image(image, "image"); !shape) return shape.error();
   if (const Status status = check_grid(grid, image.width_px, image.height_px); !status) return status.error();
   const std::uint64_t mass = mass_in(image, grid.part);
@@ -201,13 +201,13 @@ Result<std::vector<BoxCount>> count_all(const Raster<T>& image, const BoxGrid& g
 }  // namespace
 
 PixelBox foreground_box(const BinaryImage& image) { return box_of(image); }
-PixelBox foreground_box(const Raster<std::uint32_t>& image) { return box_of(image); }
+PixelBox foreground_box(const ImageOf<std::uint32_t>& image) { return box_of(image); }
 
 Result<std::vector<BoxCount>> count_boxes(const BinaryImage& image, const BoxGrid& grid, int threads, StopFlag stop) {
   return count_all(image, grid, threads, stop);
 }
 
-Result<std::vector<BoxCount>> count_boxes(const Raster<std::uint32_t>& mass, const BoxGrid& grid, int threads,
+Result<std::vector<BoxCount>> count_boxes(const ImageOf<std::uint32_t>& mass, const BoxGrid& grid, int threads,
                                           StopFlag stop) {
   return count_all(mass, grid, threads, stop);
 }

@@ -51,14 +51,14 @@ struct BoxCount {
 
 /// The smallest box that holds all pixels that are not 0; width 0 if there are none.
 PixelBox foreground_box(const BinaryImage& image);
-PixelBox foreground_box(const Raster<std::uint32_t>& image);
+PixelBox foreground_box(const ImageOf<std::uint32_t>& image);
 
 /// In the order of `grid.sides_px`. Every foreground pixel has mass 1.
 Result<std::vector<BoxCount>> count_boxes(const BinaryImage& image, const BoxGrid& grid, int threads,
                                           StopFlag stop = nullptr);
 
 /// The same of a mass that is not uniform: a pixel's value is its mass. The whole mass must be below 2^53.
-Result<std::vector<BoxCount>> count_boxes(const Raster<std::uint32_t>& mass, const BoxGrid& grid, int threads,
+Result<std::vector<BoxCount>> count_boxes(const ImageOf<std::uint32_t>& mass, const BoxGrid& grid, int threads,
                                           StopFlag stop = nullptr);
 
 }  // namespace colony

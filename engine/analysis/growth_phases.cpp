@@ -24,9 +24,10 @@ class Stretches {
     const double log_first = maths::log(series.front().size);
     for (std::size_t i = 0; i < series.size(); ++i) {
       const double t = (series[i].time_h - middle) / half, y = maths::log(series[i].size) - log_first;
-      const double radius = series[i].radius_um, weight = 4.0 / (radius * radius);
+      // sqrt N stands for the radius: one quantity for all phases, or the sums would not be comparable.
+      const double radius = std::sqrt(series[i].size), weight = 4.0 / (radius * radius);
       const std::array<double, kTerms> terms{1.0, t, t * t, y, t * y, y * y, weight, weight * t, weight * t * t,
-                                             2.0 * 2.0 / radius, 2.0 * 2.0 * t / radius, 4.0};
+                                             4.0 / radius, 4.0 * t / radius, 4.0};
       for (std::size_t k = 0; k < kTerms; ++k) sums_[i + 1][k] = sums_[i][k] + terms[k];
     }
   }

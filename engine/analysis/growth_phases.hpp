@@ -1,8 +1,9 @@
 // growth_phases: exponential growth, growth of the radius at constant speed, plateau: which are there, when, and how fast.
 // Model:   ln N = a + b t; then R = c + v t; then N constant. Each may be missing, but not all; each has at least kPhaseRowsMin rows.
 // Rule:    change points and the set of phases are those of the least BIC = n ln(S / n) + k ln n. S sums squared relative deviations of N:
-//          of ln N in the exponential phase and the plateau; 2 (R - fit) / R in the linear one, since N goes as R^2 there. k: two for a line,
-//          one for a plateau, one for each change point, one for the scatter. Phases need not join: nature has no corners.
+//          of ln N in the exponential phase and the plateau; 2 (q - fit) / q in the linear one, q = sqrt N, which goes as R there: one quantity
+//          throughout, else the sums could not be compared. k: two for a line, one for a plateau, one for each change point, one for the
+//          scatter. Phases need not join: nature has no corners. The speed is then that of R itself.
 // Intervals: 95 %, Student's t on the line's standard error times sqrt((1 + r) / (1 - r)), r = correlation of neighbouring residuals
 //          (0..0.95): counts add up, so rows are not independent. Change points have no interval.
 // Units:   h, um.

@@ -72,6 +72,7 @@ LineReport analyse_lines(const LabelImage& labels, std::int64_t gap_px, const Bo
 
 Result<LabelReport> analyse_labels(const LabelInput& input, StopFlag stop) {
   CHECK(input.labels != nullptr);
+  if (const Status status = check_box_options(input.boxes); !status) return status.error();
   const LabelImage& labels = *input.labels;
   LabelReport report;
   report.um_per_px = labels.um_per_px;
@@ -123,6 +124,7 @@ Result<LabelReport> analyse_labels(const LabelInput& input, StopFlag stop) {
 Result<ThresholdSweep> threshold_sweep(const GreyImage& image, const std::vector<int>& thresholds, bool dark_foreground,
                                        const BoxOptions& boxes, StopFlag stop) {
   if (const Status status = check_image(image, "image"); !status) return status.error();
+  if (const Status status = check_box_options(boxes); !status) return status.error();
   const auto wrong = [](const std::string& message) {
     return Error{ErrorCode::kInvalid, "thresholds: " + message, {{"thresholds", message}}};
   };

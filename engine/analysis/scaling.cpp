@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/analysis/parallel.hpp"
 #include "engine/base/check.hpp"
 #include "engine/base/maths.hpp"
 
@@ -39,37 +40,17 @@ Crossover crossover_of(const std::vector<double>& log_side, const std::vector<do
   return crossover;
 }
 
-Status check_options(const BoxOptions& options) {
-  // Each written so that NaN is refused.
-  if (!(options.side_min_px >= 1.0 && options.side_min_px <= 100.0)) {
-    return wrong(ErrorCode::kInvalid, "side_min_px", "must lie in 1..100");
-  }
-  if (!(options.side_ratio >= 1.05 && options.side_ratio <= 4.0)) {
-    return wrong(ErrorCode::kInvalid, "side_ratio", "must lie in 1.05..4");
-  }
-  if (!(options.extent_share >= 0.01 && options.extent_share <= 0.5)) {
-    return wrong(ErrorCode::kInvalid, "extent_share", "must lie in 0.01..0.5");
-  }
-  if (!options.sides_px.empty()) {
-    if (options.sides_px.size() < 3) return wrong(ErrorCode::kInvalid, "sides_px", "at least 3 are needed for a line");
-    for (std::size_t i = 1; i < options.sides_px.size(); ++i) {
-      if (options.sides_px[i] <= options.sides_px[i - 1]) return wrong(ErrorCode::kInvalid, "sides_px", "must rise");
-    }
-  }
-  return Ok{};
-}
-
 template <class T>
-std::uint64_t foreground_px(const Raster<T>& image) {
+std::uint64_t foreground_px(const ImageOf<T>& image) {
   std::uint64_t count = 0;
   for (const T value : image.values) count += value != 0 ? 1 : 0;
   return count;
 }
 
 template <class T>
-Result<BoxDimensions> dimensions_of(const Raster<T>& image, const BoxOptions& options, StopFlag stop) {
+Result<BoxDimensions> dimensions_of(const ImageOf<T>& image, const BoxOptions& options, StopFlag stop) {
   if (const Status status = check_image(image, "image"); !status) return status.error();
-  if (const Status status = check_options(options); !status) return status.error();
+  if (const Status status = check_box_options(options); !status) return status.error();
   const std::uint64_t foreground = foreground_px(image);
   if (foreground == 0) return wrong(ErrorCode::kInvalid, "image", "has no foreground: there is nothing to count");
   BoxGrid grid;
@@ -100,6 +81,32 @@ Result<BoxDimensions> dimensions_of(const Raster<T>& image, const BoxOptions& op
 }
 
 }  // namespace
+
+Status check_box_options(const BoxOptions& options) {
+  // Each written so that NaN is refused.
+  if (!(options.side_min_px >= 1.0 && options.side_min_px <= 100.0)) {
+    return wrong(ErrorCode::kInvalid, "side_min_px", "must lie in 1..100");
+  }
+  if (!(options.side_ratio >= 1.05 && options.side_ratio <= 4.0)) {
+    return wrong(ErrorCode::kInvalid, "side_ratio", "must lie in 1.05..4");
+  }
+  if (!(options.extent_share >= 0.01 && options.extent_share <= 0.5)) {
+    return wrong(ErrorCode::kInvalid, "extent_share", "must lie in 0.01..0.5");
+  }
+  if (options.offsets_per_axis < 1 || options.offsets_per_axis > kBoxOffsetsPerAxisMax) {
+    return wrong(ErrorCode::kInvalid, "offsets_per_axis", "must lie in 1..32");
+  }
+  if (options.threads < 1 || options.threads > kAnalysisThreadsMax) {
+    return wrong(ErrorCode::kInvalid, "threads", "must lie in 1..256");
+  }
+  if (!options.sides_px.empty()) {
+    if (options.sides_px.size() < 3) return wrong(ErrorCode::kInvalid, "sides_px", "at least 3 are needed for a line");
+    for (std::size_t i = 1; i < options.sides_px.size(); ++i) {
+      if (options.sides_px[i] <= options.sides_px[i - 1]) return wrong(ErrorCode::kInvalid, "sides_px", "must rise");
+    }
+  }
+  return Ok{};
+}
 
 std::vector<std::int64_t> geometric_sides(std::int64_t extent_px, const BoxOptions& options) {
   const double largest = static_cast<double>(extent_px) * options.extent_share;
@@ -136,7 +143,7 @@ Result<BoxDimensions> box_dimensions(const BinaryImage& image, const BoxOptions&
   return dimensions_of(image, options, stop);
 }
 
-Result<BoxDimensions> box_dimensions(const Raster<std::uint32_t>& mass, const BoxOptions& options, StopFlag stop) {
+Result<BoxDimensions> box_dimensions(const ImageOf<std::uint32_t>& mass, const BoxOptions& options, StopFlag stop) {
   return dimensions_of(mass, options, stop);
 }
 

@@ -63,11 +63,14 @@ struct BoxOptions {
   double side_ratio = 1.3;           // [1.05, 4]
   double extent_share = 0.125;       // largest side / extent, [0.01, 0.5]
   int offsets_per_axis = 8;          // [1, 32]
-  int threads = 1;
+  int threads = 1;                   // [1, kAnalysisThreadsMax]
   /// Not empty: exactly these (rising, at least 3) in `part`, by default the whole image: then curves of several images share their sides.
   std::vector<std::int64_t> sides_px = {};
   PixelBox part = {};
 };
+
+/// kInvalid, naming the field, unless all options are within their ranges.
+Status check_box_options(const BoxOptions& options);
 
 /// round(side_min ratio^k), each once, up to extent_px * extent_share.
 std::vector<std::int64_t> geometric_sides(std::int64_t extent_px, const BoxOptions& options);
@@ -78,6 +81,6 @@ BoxDimensions fit_dimensions(std::vector<BoxCount> counts);
 /// D0, D1, the curve and the verdict for the foreground of `image`.
 Result<BoxDimensions> box_dimensions(const BinaryImage& image, const BoxOptions& options, StopFlag stop = nullptr);
 /// The same of a measure: a pixel's value is its mass.
-Result<BoxDimensions> box_dimensions(const Raster<std::uint32_t>& mass, const BoxOptions& options, StopFlag stop = nullptr);
+Result<BoxDimensions> box_dimensions(const ImageOf<std::uint32_t>& mass, const BoxOptions& options, StopFlag stop = nullptr);
 
 }  // namespace colony

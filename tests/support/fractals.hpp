@@ -60,9 +60,9 @@ inline BinaryImage vicsek(int levels) {
 
 /// A measure: every pixel's mass is the product over the levels of the weight of its quadrant (row, column). Its D1 is
 /// -sum p log2 p.
-inline Raster<std::uint32_t> cascade(int levels, const std::array<std::uint32_t, 4>& weights) {
+inline ImageOf<std::uint32_t> cascade(int levels, const std::array<std::uint32_t, 4>& weights) {
   const std::int64_t side = power(2, levels);
-  Raster<std::uint32_t> mass(side, side);
+  ImageOf<std::uint32_t> mass(side, side);
   for (std::int64_t row = 0; row < side; ++row) {
     for (std::int64_t column = 0; column < side; ++column) {
       std::uint32_t value = 1;

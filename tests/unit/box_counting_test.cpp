@@ -28,7 +28,7 @@ struct Brute {
   double information = 0.0;
 };
 template <class T>
-Brute brute_force(const Raster<T>& image, const PixelBox& part, std::int64_t side, std::int64_t row_offset,
+Brute brute_force(const ImageOf<T>& image, const PixelBox& part, std::int64_t side, std::int64_t row_offset,
                   std::int64_t column_offset) {
   std::map<std::pair<std::int64_t, std::int64_t>, double> masses;
   double total = 0.0;
@@ -76,7 +76,7 @@ TEST(BoxCounting, EqualsTheDefinitionForEveryOffset) {
 }
 
 TEST(BoxCounting, AMeasureCountsItsMass) {
-  Raster<std::uint32_t> mass(33, 21);
+  ImageOf<std::uint32_t> mass(33, 21);
   Stream stream(5, CellId{1}, 0, Purpose::kFounder);
   for (std::uint32_t& value : mass.values) value = stream.below(3) == 0 ? stream.below(4'000'000'000u) : 0;
   const auto counts = count_boxes(mass, {{0, 0, 33, 21}, {4}, 1}, 1);

@@ -15,7 +15,7 @@ namespace {
 using namespace testing;
 
 template <class T>
-BoxDimensions measured(const Raster<T>& image, const BoxOptions& options = {}) {
+BoxDimensions measured(const ImageOf<T>& image, const BoxOptions& options = {}) {
   const auto result = box_dimensions(image, options);
   EXPECT_TRUE(result) << (result ? "" : result.error().message);
   return result ? *result : BoxDimensions{};
