@@ -25,15 +25,15 @@ inline constexpr double kImageScaleMin_um_per_px = 1e-3;
 inline constexpr double kImageScaleMax_um_per_px = 1e4;
 
 template <class T>
-struct Raster {
+struct ImageOf {
   std::int64_t width_px = 0;
   std::int64_t height_px = 0;
   std::optional<double> um_per_px = {};  // square pixels; none: not known, and then nothing is reported in um
   std::vector<T> values = {};
 
-  Raster() = default;
+  ImageOf() = default;
   /// All pixels `value`. CHECKs that the sides are in range.
-  Raster(std::int64_t width, std::int64_t height, std::optional<double> scale_um_per_px = {}, T value = T{})
+  ImageOf(std::int64_t width, std::int64_t height, std::optional<double> scale_um_per_px = {}, T value = T{})
       : width_px(width), height_px(height), um_per_px(scale_um_per_px) {
     CHECK(width >= 1 && width <= kImageSideMax_px && height >= 1 && height <= kImageSideMax_px);
     values.assign(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), value);
@@ -53,21 +53,21 @@ struct Raster {
   T at_or(std::int64_t row_index, std::int64_t column, T outside) const {
     return contains(row_index, column) ? at(row_index, column) : outside;
   }
-  friend bool operator==(const Raster&, const Raster&) = default;
+  friend bool operator==(const ImageOf&, const ImageOf&) = default;
 };
 
-using GreyImage = Raster<std::uint8_t>;
-using Grey16Image = Raster<std::uint16_t>;
+using GreyImage = ImageOf<std::uint8_t>;
+using Grey16Image = ImageOf<std::uint16_t>;
 /// 0 or not 0.
-using BinaryImage = Raster<std::uint8_t>;
-using LabelImage = Raster<std::uint32_t>;
+using BinaryImage = ImageOf<std::uint8_t>;
+using LabelImage = ImageOf<std::uint32_t>;
 
 /// kLimit or kInvalid (field: `name`) unless the sides are in 1..kImageSideMax_px, `values` has that many, and the scale, if any, is finite
 /// and within kImageScaleMin..Max_um_per_px. Every analysis calls it first.
 Status check_image_shape(std::int64_t width_px, std::int64_t height_px, std::size_t value_count,
                          std::optional<double> um_per_px, const std::string& name);
 template <class T>
-Status check_image(const Raster<T>& image, const std::string& name) {
+Status check_image(const ImageOf<T>& image, const std::string& name) {
   return check_image_shape(image.width_px, image.height_px, image.values.size(), image.um_per_px, name);
 }
 

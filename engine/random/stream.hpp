@@ -31,6 +31,7 @@ enum class Purpose : std::uint8_t {
   kMove = 15,            // of a move: guided or not, and the direction
   kMoveSurroundings = 16,  // scrambling of the disc in which a move looks for the freer half
   kMovePoints = 17,      // scrambling of the points on which a moved body is scored
+  kControl = 32,         // places of the discs of a random control; no part of any history
 };
 
 class Stream {
