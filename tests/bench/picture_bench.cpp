@@ -115,7 +115,7 @@ void run(const Options& options) {
   keep(options, "outline.png", encode_png(*render(colony, params, spec, effort)));
   keep(options, "colony.ome.tif", timed("ome_tiff", options, [&] {
          MemoryFile file;
-         write_ome_tiff(colony, params, spec, OmeChannels{}, effort, file).value();
+         static_cast<void>(write_ome_tiff(colony, params, spec, OmeChannels{}, effort, file).value());
          return file.bytes();
        }));
   Mesh mesh;
