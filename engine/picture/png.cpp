@@ -95,7 +95,9 @@ Status render_png(const Colony& colony, const Params& params, const PictureSpec&
       context = png_context(strip);
       CHECK(spng_set_png_stream(context.get(), hand_over, &hand) == 0);
       set_header(context.get(), strip);
-      CHECK(spng_encode_image(context.get(), nullptr, 0, SPNG_FMT_PNG, SPNG_ENCODE_PROGRESSIVE | SPNG_ENCODE_FINALIZE) == 0);
+      const int status = spng_encode_image(context.get(), nullptr, 0, SPNG_FMT_PNG, SPNG_ENCODE_PROGRESSIVE | SPNG_ENCODE_FINALIZE);
+      if (hand.thrown) std::rethrow_exception(hand.thrown);
+      CHECK(status == 0);
     }
     const auto row_bytes = static_cast<std::size_t>(3 * strip.width_px);
     for (std::size_t at = 0; at < strip.rgb.size(); at += row_bytes) {

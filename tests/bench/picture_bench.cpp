@@ -11,6 +11,10 @@
 #include <fstream>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Geometry>
 
 #include "engine/picture/mesh.hpp"
 #include "engine/picture/ome_tiff.hpp"
@@ -75,6 +79,18 @@ void keep(const Options& options, const std::string& name, const std::string& by
 
 std::string bytes_of(const void* data, std::size_t size) { return std::string(static_cast<const char*>(data), size); }
 
+/// By the divergence theorem, of all cells together.
+double volume_um3(const Mesh& mesh) {
+  double six = 0.0;
+  const std::size_t end = mesh.nuclei.empty() ? mesh.indices.size() : mesh.nuclei.front().first_index;
+  const auto at = [&](std::size_t i) {
+    const float* p = mesh.positions_um.data() + 3 * static_cast<std::size_t>(mesh.indices[i]);
+    return Vec3(static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2]));
+  };
+  for (std::size_t i = 0; i < end; i += 3) six += at(i).dot(at(i + 1).cross(at(i + 2)));
+  return six / 6.0;
+}
+
 std::string wavefront(const Mesh& mesh) {
   std::string text;
   char line[128];
@@ -127,6 +143,10 @@ void run(const Options& options) {
            bytes_of(mesh.indices.data(), mesh.indices.size() * sizeof(std::uint32_t));
   });
   std::printf("mesh: %zu triangles, %zu vertices, grid %.3f um\n", mesh.indices.size() / 3, mesh.positions_um.size() / 3, mesh.pitch_um);
+  const std::vector<double> volumes = path_volumes_um3(colony, params.contact.rule, *frame_of(colony, spec), effort);
+  double sum_um3 = 0.0;
+  for (const double volume : volumes) sum_um3 += volume;
+  std::printf("mesh: volume %.0f um3, by path lengths %.0f um3, ratio %.4f\n", volume_um3(mesh), sum_um3, volume_um3(mesh) / sum_um3);
   if (!options.out.empty()) keep(options, "colony.obj", wavefront(mesh));
 }
 
