@@ -38,6 +38,11 @@ inline constexpr std::size_t kEventsPerPageDefault = 1000;
 inline constexpr std::size_t kSeriesPointsMax = 10'000;
 inline constexpr std::size_t kSeriesPointsDefault = 200;
 inline constexpr std::size_t kIdempotencyKeyBytesMax = 200;
+/// A picture is held in memory as its file: at most some 200 MB.
+inline constexpr std::int64_t kServedPictureSideMax_px = 8192;
+inline constexpr std::uint64_t kMeshTrianglesDefault = 200'000;
+inline constexpr std::int64_t kServedMeshTrianglesMax = 4'000'000;  // 50 bytes each, and the file once more
+inline constexpr std::uint32_t kPackingPoints = 1024;               // a cell's volume to 1.1 %
 /// Placing more founders than this can take long: one submission at a time may.
 inline constexpr std::uint64_t kFoundersPlacedFreely = 1000;
 
@@ -110,6 +115,8 @@ http::Response get_events(Context& context, const Call& call);
 http::Response get_cells(Context& context, const Call& call);
 http::Response get_series(Context& context, const Call& call);
 http::Response get_lineage(Context& context, const Call& call);
+http::Response get_mesh(Context& context, const Call& call);
+http::Response get_analysis_of_job(Context& context, const Call& call);
 http::Response get_image(Context& context, const Call& call);
 http::Response get_log(Context& context, const Call& call);
 http::Response get_job_schema(Context& context, const Call& call);

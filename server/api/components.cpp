@@ -1,7 +1,9 @@
 // The schemas of everything that comes out (components/schemas of openapi.json).
 #include <array>
 
+#include "server/api/codec_analysis.hpp"
 #include "server/api/codec_event.hpp"
+#include "server/api/codec_report.hpp"
 #include "server/api/problems.hpp"
 #include "server/api/schema.hpp"
 
@@ -119,8 +121,8 @@ Json job_schema() {
        {"progress", reference("Progress")},
        {"links",
         strict_object(
-            {{"self", path}, {"events", path}, {"cells", path}, {"series", path}, {"image", path}, {"lineage", path},
-             {"log", path}})}});
+            {{"self", path}, {"events", path}, {"cells", path}, {"series", path}, {"image", path}, {"mesh", path},
+             {"analysis", path}, {"lineage", path}, {"log", path}})}});
 }
 
 Json lineage_schema() {
@@ -222,7 +224,7 @@ Json component_schemas(const SpecLimits& limits) {
   Json activity = names_upto(Activity::kSenescent);
   Json cell = row_schema(cell_columns());
   cell["properties"]["activity"] = std::move(activity);
-  return {
+  Json components = {
       {"JobSpec", std::move(job_spec)},
       {"Spec", spec_schema(limits)},
       {"Job", job_schema()},
@@ -249,6 +251,9 @@ Json component_schemas(const SpecLimits& limits) {
       {"ServiceInfo", service_info_schema()},
       {"Health", strict_object({{"status", typed("string")}})},
       {"Problem", problem_schema()}};
+  components.update(report_components());
+  components.update(analysis_components());
+  return components;
 }
 
 }  // namespace colony::server::api

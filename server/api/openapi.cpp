@@ -74,7 +74,9 @@ Json media_schema(const Endpoint& endpoint, std::string_view media) {
     if (endpoint.schema.empty()) return {{"type", "object"}};
     return reference(endpoint.schema);
   }
-  if (media == "image/png") return {{"type", "string"}, {"contentMediaType", "image/png"}};
+  if (media.starts_with("image/") || media.starts_with("model/")) {
+    return {{"type", "string"}, {"contentMediaType", media}};
+  }
   return {{"type", "string"}};
 }
 

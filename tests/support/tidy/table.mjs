@@ -30,9 +30,11 @@ export const thirdParty = [
   { prefix: 'sqlite3.h', places: ['server/store/'] },
   { prefix: 'SQLiteCpp/', places: ['server/store/'] },
   { prefix: 'spng.h', places: ['engine/picture/', 'engine/analysis/'] },
-  { prefix: 'tiffio.h', places: ['engine/analysis/'] },
+  { prefix: 'tiffio.h', places: ['engine/analysis/', 'engine/picture/'] },
   { prefix: 'turbojpeg.h', places: ['engine/analysis/'] },
   { prefix: 'opencv2/', places: ['engine/analysis/', 'engine/picture/'] },
+  { prefix: 'tiny_gltf.h', places: ['server/api/glb.*'] },
+  { prefix: 'zlib.h', places: ['engine/picture/'] },
   { prefix: 'xxhash.h', places: ['engine/base/'] },
   { prefix: 'Random123/', places: ['engine/random/'] },
   { prefix: 'xmmintrin.h', places: ['engine/base/'] },  // the floating-point mode
