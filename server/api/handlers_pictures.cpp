@@ -5,6 +5,7 @@
 #include "engine/analysis/growth_phases.hpp"
 #include "engine/picture/mesh.hpp"
 #include "engine/picture/ome_tiff.hpp"
+#include "server/api/analysis_work.hpp"
 #include "server/api/api.hpp"
 #include "server/api/codec_report.hpp"
 #include "server/api/glb.hpp"
@@ -18,8 +19,6 @@ Enum enum_of(const Query& query, std::string_view name, std::initializer_list<st
   const std::string value = query.text(name).value_or(std::string(*names.begin()));
   return static_cast<Enum>(std::find(names.begin(), names.end(), value) - names.begin());
 }
-
-Effort effort_of(const Context& context) { return {context.config.jobs.threads_per_job, &context.draining}; }
 
 // The scale parameters that image and analysis share; the error if both are given.
 Status read_scale(const Query& query, std::int64_t width_default_px, PictureSpec& spec) {

@@ -163,7 +163,10 @@ Json report_components() {
   job.update(report_properties());
   job["packing"] = packing_schema();
   job["growth"] = growth_schema();
-  return {{"Dimension",
+  Json shapes = report_properties();
+  for (const char* name : {"verdict", "fractal", "controls"}) shapes.erase(name);
+  return {{"Shapes", strict_object(std::move(shapes))},
+          {"Dimension",
            strict_object({{"value", number()},
                           {"se", described(number(), "of the line, not of the dimension")},
                           {"r2", number()},
