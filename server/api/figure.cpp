@@ -1,7 +1,9 @@
 // The figure of a comparison: like figures 1 and 2 of the paper, side by side for the simulated and the real colony.
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <string>
+#include <string_view>
 
 #include "engine/analysis/contour.hpp"
 #include "engine/base/check.hpp"
@@ -24,7 +26,7 @@ struct Panel {
 
 /// A curve of the plot: ln N against ln s, its mark and its line.
 struct Curve {
-  std::string name;
+  std::string_view name;
   const BoxDimensions* found = nullptr;
   Rgb colour;
 };
@@ -51,9 +53,9 @@ void draw_frame(Picture& picture, const Panel& panel) {
 }
 
 std::string two_decimals(double value) {
-  const auto hundredths = static_cast<std::int64_t>(std::abs(value) * 100.0 + 0.5);
-  const char* const point = hundredths % 100 < 10 ? ".0" : ".";
-  return (value < 0.0 ? "-" : "") + std::to_string(hundredths / 100) + point + std::to_string(hundredths % 100);
+  char text[64];
+  std::snprintf(text, sizeof text, "%.2f", value);
+  return text;
 }
 
 /// Axes shared by both plots, so that they can be read side by side.
@@ -131,8 +133,10 @@ void draw_plot(Picture& picture, const Panel& panel, const Axes& axes, const std
   std::int64_t line = panel.row + 10;
   for (const Curve& curve : curves) {
     draw_curve(picture, panel, axes, curve);
-    const std::string text = curve.name + "  " + two_decimals(curve.found->capacity.value) +
-                             (curve.found->crossover.found ? " crossover" : "");
+    std::string text(curve.name);
+    text += "  ";
+    text += two_decimals(curve.found->capacity.value);
+    if (curve.found->crossover.found) text += " crossover";
     draw_text(picture, line, panel.column + kPanel_px - 10 - kTextScale * text_width_px(text), text, kTextScale,
               curve.colour);
     line += kTextScale * (kGlyphHeight_px + 2);
@@ -163,12 +167,13 @@ std::string comparison_figure(const Comparison& comparison) {
   for (int i = 0; i < 2; ++i) {
     draw_frame(picture, panels[0][i]);
     draw_plot(picture, panels[1][i], axes, curves[i]);
-    const std::string title = i == 0 ? "simulated " : "real ";
-    draw_text(picture, 12, panels[0][i].column,
-              title + std::to_string(i == 0 ? comparison.simulated.cell_count : comparison.real.cell_count) + " cells",
-              kTextScale, {0, 0, 0});
-    draw_text(picture, panels[1][i].row - 26, panels[1][i].column, title + "boxes met by side in px", kTextScale,
-              {0, 0, 0});
+    const std::uint64_t cells = i == 0 ? comparison.simulated.cell_count : comparison.real.cell_count;
+    char title[64];
+    std::snprintf(title, sizeof title, "%s %llu cells", i == 0 ? "simulated" : "real",
+                  static_cast<unsigned long long>(cells));
+    draw_text(picture, 12, panels[0][i].column, title, kTextScale, {0, 0, 0});
+    std::snprintf(title, sizeof title, "%s boxes met by side in px", i == 0 ? "simulated" : "real");
+    draw_text(picture, panels[1][i].row - 26, panels[1][i].column, title, kTextScale, {0, 0, 0});
   }
   return encode_png(picture);
 }
