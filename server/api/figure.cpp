@@ -36,11 +36,13 @@ void draw_lines(Picture& picture, const Panel& panel, const BinaryImage& lines) 
   const double step = std::max(1.0, static_cast<double>(std::max(lines.width_px, lines.height_px)) /
                                         static_cast<double>(kPanel_px));
   const auto place = [step](std::int64_t at) { return static_cast<std::int64_t>(static_cast<double>(at) / step); };
+  const std::int64_t down = (kPanel_px - place(lines.height_px)) / 2;
+  const std::int64_t right = (kPanel_px - place(lines.width_px)) / 2;
   for (std::int64_t row = 0; row < lines.height_px; ++row) {
     for (std::int64_t column = 0; column < lines.width_px; ++column) {
       if (lines.at(row, column) == 0) continue;
-      put_pixel(picture, panel.row + std::min(place(row), kPanel_px - 1),
-                panel.column + std::min(place(column), kPanel_px - 1), {0, 0, 0});
+      put_pixel(picture, panel.row + std::min(down + place(row), kPanel_px - 1),
+                panel.column + std::min(right + place(column), kPanel_px - 1), {0, 0, 0});
     }
   }
 }
@@ -164,6 +166,8 @@ std::string comparison_figure(const Comparison& comparison) {
   for (const auto& side : curves) {
     for (const Curve& curve : side) axes.take(curve);
   }
+  axes.side_high *= 1.2;
+  axes.count_high *= 12.0;  // room for the legend
   for (int i = 0; i < 2; ++i) {
     draw_frame(picture, panels[0][i]);
     draw_plot(picture, panels[1][i], axes, curves[i]);

@@ -245,7 +245,9 @@ TEST(Queries, EveryWrongParameterIsNamed) {
                                         {kJob + "/series?points=0", "points"},
                                         {kJob + "/series?points=10001", "points"},
                                         {kJob + "/image?style=cubist", "style"},
-                                        {kJob + "/image?style=phase", "style"},
+                                        {kJob + "/image?lines=none", "lines"},
+                                        {kJob + "/mesh?triangles_max=999", "triangles_max"},
+                                        {kJob + "/analysis?width_px=4097", "width_px"},
                                         {kJob + "/image?width_px=15", "width_px"},
                                         {kJob + "/image?width_px=1000000", "width_px"},
                                         {kJob + "/image?um_per_px=0", "um_per_px"},
@@ -296,7 +298,7 @@ TEST(Accept, ChoosesByWeightAndListsWhatThereIs) {
 TEST(Jobs, UnknownOnesAre404) {
   ApiFixture fixture;
   const std::string other = "/v1/jobs/01890000-0000-7000-8000-00000000dead";
-  for (const char* what : {"", "/events", "/cells", "/series", "/image", "/log"}) {
+  for (const char* what : {"", "/events", "/cells", "/series", "/image", "/mesh", "/analysis", "/lineage", "/log"}) {
     auto response = fixture.get(other + what);
     EXPECT_EQ(response.status, 404) << what;
     EXPECT_THAT(json_of(response)["detail"].get<std::string>(), HasSubstr("dead"));
@@ -308,8 +310,7 @@ TEST(Jobs, UnknownOnesAre404) {
 
 TEST(Jobs, WhatBelongsToLaterVersionsIsNotThere) {
   ApiFixture fixture;
-  for (const std::string& path : {kJob + "/mesh", kJob + "/analysis", std::string("/v1/sweeps"),
-                                  std::string("/v1/tokens"), std::string("/docs")}) {
+  for (const std::string& path : {std::string("/v1/sweeps"), std::string("/v1/tokens"), std::string("/docs")}) {
     EXPECT_EQ(fixture.get(path).status, 404) << path;
   }
   EXPECT_EQ(fixture.post(kJob + "/fork", "{}").status, 404);

@@ -98,6 +98,33 @@ TEST(HttpGate, HeaderOfExactlyTheLimitPasses) {
   EXPECT_EQ(beyond.refusal().status, 431);
 }
 
+TEST(HttpGate, OnePathTakesLargerBodies) {
+  GatePolicy with_path = policy();
+  with_path.large_body_path = "/v1/analyses";
+  with_path.large_body_bytes_max = 5000;
+  struct Case {
+    const char* line;
+    const char* framing;
+    int status;  // 0: passes
+    bool may_be_large;
+  };
+  const Case cases[] = {{"POST /v1/analyses?name=a", "Content-Length: 5000", 0, true},
+                        {"POST /v1/analyses", "Content-Length: 5001", 413, false},
+                        {"POST /v1/analyses", "Content-Length: 1000", 0, false},
+                        {"POST /v1/analyses", "Transfer-Encoding: chunked", 0, true},
+                        {"PUT /v1/analyses", "Content-Length: 1001", 413, false},
+                        {"POST /v1/analyses/", "Content-Length: 1001", 413, false},
+                        {"POST /v1/jobs", "Content-Length: 1001", 413, false},
+                        {"POST /v1/jobs", "Transfer-Encoding: chunked", 0, false}};
+  for (const Case& one : cases) {
+    RequestHead head;
+    const auto refusal = examine(
+        std::string(one.line) + " HTTP/1.1\r\nHost: localhost\r\n" + one.framing + "\r\n\r\n", with_path, head);
+    EXPECT_EQ(refusal ? refusal->status : 0, one.status) << one.line << " " << one.framing;
+    EXPECT_EQ(head.may_be_large, one.may_be_large) << one.line << " " << one.framing;
+  }
+}
+
 TEST(HttpGate, ReadsWhatTheSessionNeeds) {
   RequestHead head;
   const auto refusal = examine(

@@ -224,6 +224,40 @@ TEST(HttpLimits, AFullQueueIsToldAtOnce) {
   EXPECT_EQ((a_is_refused ? b : a).read_reply().body, "passed");
 }
 
+TEST(HttpLimits, LargeBodiesAreCounted) {
+  ServerConfig config;
+  config.large_body_path = "/large";
+  config.body_bytes_max = 10;
+  config.large_body_bytes_max = 20;
+  config.large_bodies_max = 1;
+  Door door;
+  TestServer server(
+      [&door](Router& router) {
+        router.add("POST", "/large", [&door](const Request& request) {
+          if (request.body.size() > 10) door.pass();
+          return text(request.body);
+        });
+      },
+      config);
+  server.run();
+  const auto large = [](int size) {
+    return "POST /large HTTP/1.1\r\nHost: localhost\r\nContent-Length: " + std::to_string(size) + "\r\n\r\n" +
+           std::string(static_cast<std::size_t>(size), 'x');
+  };
+  RawClient first(server.port());
+  first.send(large(20));
+  door.wait_for_arrivals(1);
+  RawClient second(server.port());
+  EXPECT_EQ(second.ask(large(11)).status, 503);
+  RawClient small(server.port());
+  EXPECT_EQ(small.ask(large(10)).status, 200) << "bodies of common size need no turn";
+  door.open();
+  EXPECT_EQ(first.read_reply().body, std::string(20, 'x'));
+  RawClient third(server.port());
+  EXPECT_EQ(third.ask(large(20)).status, 200) << "the turn was given back";
+  EXPECT_EQ(RawClient(server.port()).ask(large(21)).status, 413);
+}
+
 TEST(HttpLimits, HeavyRequestsLeaveThreadsForTheOthers) {
   ServerConfig config;
   config.worker_threads = 2;
