@@ -240,9 +240,8 @@ TEST(HttpLimits, LargeBodiesAreCounted) {
       },
       config);
   server.run();
-  const auto large = [](int size) {
-    return "POST /large HTTP/1.1\r\nHost: localhost\r\nContent-Length: " + std::to_string(size) + "\r\n\r\n" +
-           std::string(static_cast<std::size_t>(size), 'x');
+  const auto large = [](std::size_t size) {
+    return "POST /large HTTP/1.1\r\nHost: localhost\r\nContent-Length: " + std::to_string(size) + "\r\n\r\n" + std::string(size, 'x');
   };
   RawClient first(server.port());
   first.send(large(20));
