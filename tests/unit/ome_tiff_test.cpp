@@ -6,10 +6,10 @@
 #include <cstring>
 #include <memory>
 #include <string>
+#include <tiffio.h>
 #include <vector>
 
 #include <gtest/gtest.h>
-#include <tiffio.h>
 
 #include "engine/picture/optics.hpp"
 #include "engine/picture/paths.hpp"
@@ -50,8 +50,9 @@ Tiff open(Source& source) {
     s.position = whence == SEEK_SET ? offset : whence == SEEK_CUR ? s.position + offset : s.bytes.size() + offset;
     return s.position;
   };
-  return Tiff(TIFFClientOpen("memory", "rm", &source, read, write, seek, [](thandle_t) { return 0; },
-                             [](thandle_t user) -> toff_t { return static_cast<Source*>(user)->bytes.size(); }, nullptr, nullptr),
+  return Tiff(TIFFClientOpen(
+                  "memory", "rm", &source, read, write, seek, [](thandle_t) { return 0; },
+                  [](thandle_t user) -> toff_t { return static_cast<Source*>(user)->bytes.size(); }, nullptr, nullptr),
               TIFFClose);
 }
 
@@ -136,7 +137,7 @@ TEST(OmeTiff, XmlSaysSizeTypeAndChannels) {
   EXPECT_NE(xml.find("Name=\"brightfield\""), std::string::npos);
   EXPECT_NE(xml.find("Name=\"labels\""), std::string::npos);
   EXPECT_EQ(xml.find("Name=\"phase\""), std::string::npos);
-  for (const char c : xml) ASSERT_TRUE(c == '\n' || (c >= ' ' && c <= '~'));   // the tag is ASCII
+  for (const char c : xml) ASSERT_TRUE(c == '\n' || (c >= ' ' && c <= '~'));  // the tag is ASCII
 }
 
 TEST(OmeTiff, ThreadsCannotMatter) {
@@ -179,10 +180,13 @@ TEST(OmeTiff, RefusalsAreErrors) {
   EXPECT_FALSE(write_ome_tiff(colony, params, of_scale(0.5), OmeChannels{}, Effort{}, almost));
   MemoryFile file;
   OmeChannels none{false, false, false, false};
-  EXPECT_EQ(write_ome_tiff(colony, params, of_scale(0.5), none, Effort{}, file).error().fields.at(0).pointer, "channels");
-  EXPECT_EQ(write_ome_tiff(colony, params, of_scale(-1.0), OmeChannels{}, Effort{}, file).error().fields.at(0).pointer, "um_per_px");
+  EXPECT_EQ(write_ome_tiff(colony, params, of_scale(0.5), none, Effort{}, file).error().fields.at(0).pointer,
+            "channels");
+  EXPECT_EQ(write_ome_tiff(colony, params, of_scale(-1.0), OmeChannels{}, Effort{}, file).error().fields.at(0).pointer,
+            "um_per_px");
   const std::atomic<bool> stop = true;
-  EXPECT_THROW(static_cast<void>(write_ome_tiff(colony, params, of_scale(0.5), OmeChannels{}, Effort{1, &stop}, file)), Stopped);
+  EXPECT_THROW(static_cast<void>(write_ome_tiff(colony, params, of_scale(0.5), OmeChannels{}, Effort{1, &stop}, file)),
+               Stopped);
 }
 
 }  // namespace
