@@ -232,7 +232,7 @@ Status write_ome_tiff(const Colony& colony, const Params& params, const PictureS
                               static_cast<std::uint64_t>(sample_bits / 8) * channels.size();
   const Error refused{ErrorCode::kStorage, "the file could not be written", {}};
   Handle handle{file};
-  const Tiff tiff = open_tiff(handle, bytes > kClassicBytesMax);
+  const Tiff tiff = open_tiff(handle, chosen.big || bytes > kClassicBytesMax);
   if (!tiff) return refused;
   for (std::size_t i = 0; i < channels.size(); ++i) {
     if (!set_tags(tiff.get(), frame, sample_bits, i == 0 ? ome_xml(frame, channels, sample_bits) : std::string()) ||

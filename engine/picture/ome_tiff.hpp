@@ -50,6 +50,7 @@ struct OmeChannels {
   bool phase = true;
   bool nuclei = true;
   bool labels = true;
+  bool big = false;  // BigTIFF also where classic TIFF would do
 };
 
 /// Of `spec` only the scale counts.

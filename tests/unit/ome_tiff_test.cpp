@@ -140,6 +140,38 @@ TEST(OmeTiff, XmlSaysSizeTypeAndChannels) {
   for (const char c : xml) ASSERT_TRUE(c == '\n' || (c >= ' ' && c <= '~'));  // the tag is ASCII
 }
 
+TEST(OmeTiff, BeyondSixteenBitsOfCellsSamplesHaveThirtyTwo) {
+  // A lattice of 65,792 cells, each a few coarse pixels; as BigTIFF, which nothing of a test's size would be by itself.
+  const Params params = testing::paper_without_noise();
+  std::vector<Cell> cells;
+  for (int row = 0; row < 256; ++row) {
+    for (int column = 0; column < 257; ++column) cells.push_back(testing::ball_at(16.0 * column, 16.0 * row, 6.0));
+  }
+  const Colony colony = found(params, cells);
+  OmeChannels channels{true, false, false, true};
+  channels.big = true;
+  MemoryFile file;
+  ASSERT_TRUE(write_ome_tiff(colony, params, of_scale(4.0), channels, Effort{2, nullptr}, file));
+  Source source{file.bytes()};
+  const Tiff tiff = open(source);
+  ASSERT_TRUE(tiff);
+  EXPECT_TRUE(TIFFIsBigTIFF(tiff.get()));
+  char* description = nullptr;
+  ASSERT_EQ(TIFFGetField(tiff.get(), TIFFTAG_IMAGEDESCRIPTION, &description), 1);
+  EXPECT_EQ(attribute(description, "Type"), "uint32");
+  ASSERT_EQ(TIFFSetDirectory(tiff.get(), 1), 1);
+  const Frame frame = *frame_of(colony, of_scale(4.0));
+  const TopView view = top_view(colony, frame);
+  std::vector<std::uint32_t> row(static_cast<std::size_t>(frame.width_px));
+  std::uint32_t greatest = 0;
+  for (std::int64_t y = 0; y < frame.height_px; ++y) {
+    ASSERT_EQ(TIFFReadScanline(tiff.get(), row.data(), static_cast<std::uint32_t>(y), 0), 1);
+    ASSERT_TRUE(std::equal(row.begin(), row.end(), view.owner.begin() + y * frame.width_px)) << y;
+    greatest = std::max(greatest, *std::max_element(row.begin(), row.end()));
+  }
+  EXPECT_EQ(greatest, 65792u);
+}
+
 TEST(OmeTiff, ThreadsCannotMatter) {
   const Params params = paper();
   const Colony colony = found(params, scattered_cells(25, 40.0, 7));
