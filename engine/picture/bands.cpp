@@ -4,7 +4,8 @@
 
 namespace colony {
 
-BandCells::BandCells(const Colony& colony, const Frame& frame, RowRange rows) : rows_(rows), first_band_(rows.first / kBandRows_px) {
+BandCells::BandCells(const Colony& colony, const Frame& frame, RowRange rows)
+    : rows_(rows), first_band_(rows.first / kBandRows_px) {
   CHECK(rows.first >= 0 && rows.first <= rows.end && rows.end <= frame.height_px);
   if (rows.first == rows.end) return;
   of_band_.resize(static_cast<std::size_t>((rows.end - 1) / kBandRows_px - first_band_ + 1));

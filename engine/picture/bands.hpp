@@ -32,13 +32,13 @@ inline Span centres_within(double low_px, double high_px, std::int64_t begin, st
 
 /// Columns whose centres lie in the box, clipped to the frame.
 inline Span columns_of(const Box& box, const Frame& frame) {
-  return centres_within((box.low.x() - frame.left_um) / frame.um_per_px, (box.high.x() - frame.left_um) / frame.um_per_px, 0,
-                        frame.width_px);
+  return centres_within((box.low.x() - frame.left_um) / frame.um_per_px,
+                        (box.high.x() - frame.left_um) / frame.um_per_px, 0, frame.width_px);
 }
 /// Rows whose centres lie in the box, clipped to `rows`.
 inline Span rows_of(const Box& box, const Frame& frame, RowRange rows) {
-  return centres_within((frame.top_um - box.high.y()) / frame.um_per_px, (frame.top_um - box.low.y()) / frame.um_per_px, rows.first,
-                        rows.end);
+  return centres_within((frame.top_um - box.high.y()) / frame.um_per_px, (frame.top_um - box.low.y()) / frame.um_per_px,
+                        rows.first, rows.end);
 }
 
 /// The rows asked for, cut into bands at multiples of kBandRows_px, with the cells of each by ascending id.

@@ -26,7 +26,8 @@ Error refuse(ErrorCode code, std::string message) {
 std::uint64_t count_triangles(const Colony& colony, ContactRule rule, const MeshGrid& grid, const Effort& effort) {
   const std::vector<TileCells> tiles = tiles_of(colony, grid);
   std::vector<std::uint64_t> counts(tiles.size(), 0);
-  for_each_piece(tiles.size(), effort, [&](std::size_t i) { counts[i] = count_part_triangles(colony, rule, grid, tiles[i]); });
+  for_each_piece(tiles.size(), effort,
+                 [&](std::size_t i) { counts[i] = count_part_triangles(colony, rule, grid, tiles[i]); });
   std::uint64_t sum = 0;
   for (const std::uint64_t count : counts) sum += count;
   return sum;
@@ -37,7 +38,8 @@ MeshGrid grid_within(const Colony& colony, ContactRule rule, std::uint64_t budge
   double semiaxes_um = 0.0;
   for (const Cell& cell : colony.cells()) semiaxes_um += std::sqrt(cell.semiaxes_um.x() * cell.semiaxes_um.y());
   const double least_um = pitch_min_um(colony);
-  double pitch_um = std::max(least_um, kFirstPitchPerSemiaxis * semiaxes_um / static_cast<double>(colony.cells().size()));
+  double pitch_um =
+      std::max(least_um, kFirstPitchPerSemiaxis * semiaxes_um / static_cast<double>(colony.cells().size()));
   for (int tries = 0;; ++tries) {
     const MeshGrid grid = grid_of(colony, pitch_um);
     const std::uint64_t count = count_triangles(colony, rule, grid, effort);
@@ -54,9 +56,10 @@ MeshGrid grid_within(const Colony& colony, ContactRule rule, std::uint64_t budge
 struct Part {
   std::vector<float> positions_um;
   std::vector<float> normals;
-  std::vector<std::uint32_t> indices;   // into the part's own vertices
+  std::vector<std::uint32_t> indices;  // into the part's own vertices
 };
 
+/// Normals of those vertices that have none yet: area-weighted over the part's triangles.
 void add_normals(Part& part) {
   std::vector<Vec3> sums(part.positions_um.size() / 3, Vec3::Zero());
   const auto at = [&](std::uint32_t vertex) {
@@ -68,11 +71,13 @@ void add_normals(Part& part) {
     const Vec3 twice_area = (at(v[1]) - at(v[0])).cross(at(v[2]) - at(v[0]));
     for (int k = 0; k < 3; ++k) sums[v[k]] += twice_area;
   }
-  part.normals.reserve(part.positions_um.size());
-  for (const Vec3& sum : sums) {
-    const double length = std::sqrt(sum.squaredNorm());
-    const Vec3 normal = length > 0.0 ? Vec3(sum / length) : Vec3(0.0, 0.0, 1.0);
-    for (int axis = 0; axis < 3; ++axis) part.normals.push_back(static_cast<float>(normal[axis]));
+  part.normals.resize(part.positions_um.size(), 0.0F);
+  for (std::size_t v = 0; v < sums.size(); ++v) {
+    float* to = part.normals.data() + 3 * v;
+    if (to[0] != 0.0F || to[1] != 0.0F || to[2] != 0.0F) continue;
+    const double length = std::sqrt(sums[v].squaredNorm());
+    const Vec3 normal = length > 0.0 ? Vec3(sums[v] / length) : Vec3(0.0, 0.0, 1.0);
+    for (int axis = 0; axis < 3; ++axis) to[axis] = static_cast<float>(normal[axis]);
   }
 }
 
@@ -82,7 +87,7 @@ struct Face {
   bool turned;
 };
 
-Part cell_part(const std::vector<BorderTile>& tiles, const std::vector<Face>& faces) {
+Part cell_part(const std::vector<BorderTile>& tiles, std::uint32_t id, const std::vector<Face>& faces) {
   struct Corner {
     std::uint64_t key;
     std::uint32_t tile, vertex;
@@ -91,7 +96,8 @@ Part cell_part(const std::vector<BorderTile>& tiles, const std::vector<Face>& fa
   corners.reserve(3 * faces.size());
   for (const Face& face : faces) {
     const BorderTriangle& triangle = tiles[face.tile].triangles[face.triangle];
-    for (const std::uint32_t vertex : triangle.vertex) corners.push_back({tiles[face.tile].keys[vertex], face.tile, vertex});
+    for (const std::uint32_t vertex : triangle.vertex)
+      corners.push_back({tiles[face.tile].keys[vertex], face.tile, vertex});
   }
   Part part;
   std::vector<std::uint64_t> keys;
@@ -100,6 +106,7 @@ Part cell_part(const std::vector<BorderTile>& tiles, const std::vector<Face>& fa
   std::sort(keys.begin(), keys.end());
   keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
   part.positions_um.resize(3 * keys.size());
+  part.normals.resize(3 * keys.size());
   std::vector<std::uint32_t> indices;
   indices.reserve(corners.size());
   for (const Corner& corner : corners) {
@@ -108,6 +115,11 @@ Part cell_part(const std::vector<BorderTile>& tiles, const std::vector<Face>& fa
     // Tiles that share a vertex have computed the same place.
     const float* from = tiles[corner.tile].positions_um.data() + 3 * static_cast<std::size_t>(corner.vertex);
     std::copy(from, from + 3, part.positions_um.begin() + static_cast<std::ptrdiff_t>(3 * index));
+    const float sign = tiles[corner.tile].inside[corner.vertex] == id ? 1.0F : -1.0F;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      part.normals[3 * index + axis] =
+          sign * tiles[corner.tile].normals[3 * static_cast<std::size_t>(corner.vertex) + axis];
+    }
   }
   for (std::size_t i = 0; i < faces.size(); ++i) {
     if (faces[i].turned) std::swap(indices[3 * i + 1], indices[3 * i + 2]);
@@ -130,7 +142,8 @@ std::vector<Part> cell_parts(const Colony& colony, ContactRule rule, const MeshG
     }
   }
   std::vector<Part> parts(faces.size());
-  for_each_piece(parts.size(), effort, [&](std::size_t i) { parts[i] = cell_part(tiles, faces[i]); });
+  for_each_piece(parts.size(), effort,
+                 [&](std::size_t i) { parts[i] = cell_part(tiles, static_cast<std::uint32_t>(i + 1), faces[i]); });
   return parts;
 }
 
@@ -151,7 +164,8 @@ std::vector<Part> nucleus_parts(const Colony& colony, ContactRule rule, int leve
     for (const Vec3& p : vertices) {
       for (int axis = 0; axis < 3; ++axis) parts[i].positions_um.push_back(static_cast<float>(p[axis]));
     }
-    for (const auto& triangle : sphere.triangles) parts[i].indices.insert(parts[i].indices.end(), triangle.begin(), triangle.end());
+    for (const auto& triangle : sphere.triangles)
+      parts[i].indices.insert(parts[i].indices.end(), triangle.begin(), triangle.end());
     add_normals(parts[i]);
   });
   return parts;
@@ -160,11 +174,12 @@ std::vector<Part> nucleus_parts(const Colony& colony, ContactRule rule, int leve
 void append(Mesh& mesh, std::vector<MeshPart>& list, std::vector<Part>& parts) {
   for (std::size_t i = 0; i < parts.size(); ++i) {
     Part& part = parts[i];
-    const MeshPart placed{CellId{static_cast<std::uint32_t>(i + 1)}, mesh.positions_um.size() / 3, part.positions_um.size() / 3,
-                          mesh.indices.size(), part.indices.size()};
+    const MeshPart placed{CellId{static_cast<std::uint32_t>(i + 1)}, mesh.positions_um.size() / 3,
+                          part.positions_um.size() / 3, mesh.indices.size(), part.indices.size()};
     mesh.positions_um.insert(mesh.positions_um.end(), part.positions_um.begin(), part.positions_um.end());
     mesh.normals.insert(mesh.normals.end(), part.normals.begin(), part.normals.end());
-    for (const std::uint32_t index : part.indices) mesh.indices.push_back(static_cast<std::uint32_t>(placed.first_vertex) + index);
+    for (const std::uint32_t index : part.indices)
+      mesh.indices.push_back(static_cast<std::uint32_t>(placed.first_vertex) + index);
     list.push_back(placed);
     part = Part();
   }
@@ -174,7 +189,8 @@ void append(Mesh& mesh, std::vector<MeshPart>& list, std::vector<Part>& parts) {
 
 Result<Mesh> build_mesh(const Colony& colony, ContactRule rule, const MeshSpec& spec, const Effort& effort) {
   if (spec.triangles_max < kTrianglesMin || spec.triangles_max > kTrianglesMax) {
-    return refuse(ErrorCode::kInvalid, "must be in [" + std::to_string(kTrianglesMin) + ", " + std::to_string(kTrianglesMax) + "]");
+    return refuse(ErrorCode::kInvalid,
+                  "must be in [" + std::to_string(kTrianglesMin) + ", " + std::to_string(kTrianglesMax) + "]");
   }
   const auto cell_count = static_cast<std::int64_t>(colony.cells().size());
   if (cell_count == 0) return Mesh{};

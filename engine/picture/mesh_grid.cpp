@@ -2,22 +2,20 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
-#include <Eigen/Geometry>
-
-#include "engine/base/check.hpp"
 #include "engine/picture/column.hpp"
+#include "engine/picture/mesh_tetrahedron.hpp"
 #include "engine/picture/pixels.hpp"
 
 namespace colony {
 namespace {
 
 constexpr std::int64_t kTileNodes = kTileCubes + 1;
-constexpr std::int64_t kNodesMax = std::int64_t{1} << 24;    // along x and y; keys hold no more
-constexpr std::int64_t kLevelsMax = std::int64_t{1} << 10;
 // A vertex keeps off the ends of its edge, so that triangles have an area.
 constexpr double kEndShare = 0.02;
 constexpr int kRootSteps = 5;
+constexpr double kSlopeStep_um = 1e-3;  // of the differences that give a normal
 
 /// A simplex: corners base + mask; key = place of the base, then the masks.
 struct Corner {
@@ -25,7 +23,9 @@ struct Corner {
   Corner plus(unsigned mask) const { return {x + (mask & 1U), y + ((mask >> 1) & 1U), z + ((mask >> 2) & 1U)}; }
 };
 std::uint64_t key_of(const Corner& base, unsigned first, unsigned second) {
-  return ((static_cast<std::uint64_t>(base.x) << 34 | static_cast<std::uint64_t>(base.y) << 10 | static_cast<std::uint64_t>(base.z)) << 6) |
+  return ((static_cast<std::uint64_t>(base.x) << 34 | static_cast<std::uint64_t>(base.y) << 10 |
+           static_cast<std::uint64_t>(base.z))
+          << 6) |
          first << 3 | second;
 }
 std::uint64_t edge_key(const Corner& base, unsigned mask) { return key_of(base, mask, 0); }
@@ -38,9 +38,11 @@ struct TileBody {
   std::uint32_t id;
   ColumnScan scan;
   Box box;
-  TileBody(const Colony& colony, CellId cell_id) : id(cell_id.value), scan(colony.body(cell_id)), box(colony.body(cell_id).box()) {}
+  TileBody(const Colony& colony, CellId cell_id)
+      : id(cell_id.value), scan(colony.body(cell_id)), box(colony.body(cell_id).box()) {}
   bool may_hold(const Vec3& p) const {
-    return p.x() >= box.low.x() && p.x() <= box.high.x() && p.y() >= box.low.y() && p.y() <= box.high.y() && p.z() <= box.high.z();
+    return p.x() >= box.low.x() && p.x() <= box.high.x() && p.y() >= box.low.y() && p.y() <= box.high.y() &&
+           p.z() <= box.high.z();
   }
   double field(const Vec3& p) const { return scan.column(p.x(), p.y()).field(p.z()); }
 };
@@ -61,15 +63,23 @@ class TileWork {
   void for_each_mixed(const Visit& visit) const;
 
   Vec3 edge_point(const Corner& p, const Corner& q) const;
+  /// The cell at one end of the edge from which it leads out (the lower id of two), and the normal out of it at a point
+  /// of the border.
+  std::uint32_t inside_of(const Corner& p, const Corner& q) const { return leads_back(p, q) ? label(q) : label(p); }
+  Vec3 normal_at(const Corner& p, const Corner& q, const Vec3& point_um) const;
 
  private:
   std::size_t index(const Corner& c) const {
     return static_cast<std::size_t>(((c.z * kTileNodes) + (c.y - y0_)) * kTileNodes + (c.x - x0_));
   }
+  bool leads_back(const Corner& p, const Corner& q) const {
+    return label(p) == 0 || (label(q) != 0 && label(q) < label(p));
+  }
   Vec3 place(const Corner& c) const { return grid_.position_um(c.x, c.y, c.z); }
   void label_nodes();
   const TileBody& body(std::uint32_t id) const {
-    const auto found = std::lower_bound(bodies_.begin(), bodies_.end(), id, [](const TileBody& b, std::uint32_t value) { return b.id < value; });
+    const auto found = std::lower_bound(bodies_.begin(), bodies_.end(), id,
+                                        [](const TileBody& b, std::uint32_t value) { return b.id < value; });
     return *found;
   }
   /// What decides between label a (>= 0) and b (< 0).
@@ -87,15 +97,20 @@ void TileWork::label_nodes() {
   labels_.assign(count, 0);
   std::vector<double> most(count, -1.0), sum(count, 0.0);
   for (const TileBody& b : bodies_) {
-    const auto nodes = [&](double low_um, double high_um, double origin_um, std::int64_t begin, std::int64_t end) {
-      const double low = std::clamp((low_um - origin_um) / grid_.pitch_um, static_cast<double>(begin), static_cast<double>(end));
-      const double high = std::clamp((high_um - origin_um) / grid_.pitch_um, static_cast<double>(begin - 1), static_cast<double>(end - 1));
+    const auto nodes = [](double low_um, double high_um, double origin_um, double pitch_um, std::int64_t begin,
+                          std::int64_t end) {
+      const double low =
+          std::clamp((low_um - origin_um) / pitch_um, static_cast<double>(begin), static_cast<double>(end));
+      const double high =
+          std::clamp((high_um - origin_um) / pitch_um, static_cast<double>(begin - 1), static_cast<double>(end - 1));
       return std::pair(ceil_to_int(low), floor_to_int(high) + 1);
     };
     const Vec3 origin = grid_.position_um(0, 0, 0);
-    const auto [x_begin, x_end] = nodes(b.box.low.x(), b.box.high.x(), origin.x(), x0_, x0_ + kTileNodes);
-    const auto [y_begin, y_end] = nodes(b.box.low.y(), b.box.high.y(), origin.y(), y0_, y0_ + kTileNodes);
-    const auto [z_begin, z_end] = nodes(b.box.low.z(), b.box.high.z(), origin.z(), 1, grid_.levels);
+    const auto [x_begin, x_end] =
+        nodes(b.box.low.x(), b.box.high.x(), origin.x(), grid_.pitch_um, x0_, x0_ + kTileNodes);
+    const auto [y_begin, y_end] =
+        nodes(b.box.low.y(), b.box.high.y(), origin.y(), grid_.pitch_um, y0_, y0_ + kTileNodes);
+    const auto [z_begin, z_end] = nodes(b.box.low.z(), b.box.high.z(), origin.z(), grid_.pitch_z_um(), 1, grid_.levels);
     for (std::int64_t y = y_begin; y < y_end; ++y) {
       for (std::int64_t x = x_begin; x < x_end; ++x) {
         const Vec3 foot = grid_.position_um(x, y, 0);
@@ -105,7 +120,7 @@ void TileWork::label_nodes() {
           if (!(field >= 0.0)) continue;
           const std::size_t at = index({x, y, z});
           sum[at] += field;
-          if (!(field > most[at])) continue;   // a tie stays with the lower id
+          if (!(field > most[at])) continue;  // a tie stays with the lower id
           most[at] = field;
           labels_[at] = b.id;
         }
@@ -114,7 +129,7 @@ void TileWork::label_nodes() {
   }
   if (rule_ == ContactRule::kMax) return;
   for (std::size_t i = 0; i < count; ++i) {
-    if (labels_[i] != 0 && !(most[i] - (sum[i] - most[i]) >= 0.0)) labels_[i] = 0;   // a void
+    if (labels_[i] != 0 && !(most[i] - (sum[i] - most[i]) >= 0.0)) labels_[i] = 0;  // a void
   }
 }
 
@@ -134,7 +149,8 @@ void TileWork::for_each_mixed(const Visit& visit) const {
         if (!mixed) continue;
         for (const auto& [first, second] : kChains) {
           if (at[0] == at[first] && at[0] == at[second] && at[0] == at[7]) continue;
-          visit(base, std::array<unsigned, 4>{0, first, second, 7}, std::array<std::uint32_t, 4>{at[0], at[first], at[second], at[7]});
+          visit(base, std::array<unsigned, 4>{0, first, second, 7},
+                std::array<std::uint32_t, 4>{at[0], at[first], at[second], at[7]});
         }
       }
     }
@@ -155,7 +171,7 @@ double TileWork::difference(std::uint32_t a, std::uint32_t b, const Vec3& p) con
 
 Vec3 TileWork::edge_point(const Corner& p, const Corner& q) const {
   // From a cell to another or to nothing; always in the same direction, whoever asks.
-  const bool turned = label(p) == 0 || (label(q) != 0 && label(q) < label(p));
+  const bool turned = leads_back(p, q);
   const Corner& from = turned ? q : p;
   const Corner& to = turned ? p : q;
   const std::uint32_t a = label(from), b = label(to);
@@ -180,81 +196,23 @@ Vec3 TileWork::edge_point(const Corner& p, const Corner& q) const {
       out = guess, out_value = value;
     }
   }
-  const double root = in_value > 0.0 && out_value < 0.0 ? in + (out - in) * (in_value / (in_value - out_value)) : (in_value > 0.0 ? out : in);
+  const double root = in_value > 0.0 && out_value < 0.0 ? in + (out - in) * (in_value / (in_value - out_value))
+                                                        : (in_value > 0.0 ? out : in);
   return start + std::clamp(root, kEndShare, 1.0 - kEndShare) * (end - start);
 }
 
-// ---- the borders within one tetrahedron ----
-
-/// A vertex of the surface by the corners (0..3) of its tetrahedron that it stands between, as a set of bits.
-using Between = unsigned;
-constexpr Between bit(int corner) { return 1U << corner; }
-
-/// A border polygon of labels at corners a | b (any corner with the label).
-struct Polygon {
-  int a, b;
-  int size;
-  std::array<Between, 4> vertices;
-};
-
-/// The polygons of a tetrahedron whose labels are not all equal; returns how many.
-int polygons_of(const std::array<std::uint32_t, 4>& labels, std::array<Polygon, 6>& out) {
-  int count = 0;
-  int same_count = 0, same_a = 0, same_b = 0;
-  for (int i = 0; i < 4; ++i) {
-    for (int j = i + 1; j < 4; ++j) {
-      if (labels[i] == labels[j]) ++same_count, same_a = i, same_b = j;
-    }
+Vec3 TileWork::normal_at(const Corner& p, const Corner& q, const Vec3& point_um) const {
+  if (!(point_um.z() > 0.0)) return {0.0, 0.0, -1.0};  // the dish
+  const std::uint32_t inside = inside_of(p, q);
+  const std::uint32_t outside = inside == label(p) ? label(q) : label(p);
+  Vec3 slope;
+  for (int axis = 0; axis < 3; ++axis) {
+    Vec3 step = Vec3::Zero();
+    step[axis] = kSlopeStep_um;
+    slope[axis] = difference(inside, outside, point_um - step) - difference(inside, outside, point_um + step);
   }
-  const Between all = 15;
-  if (same_count == 3) {   // one corner against three
-    int alone = 0;
-    while (labels[alone] == labels[(alone + 1) & 3] || labels[alone] == labels[(alone + 2) & 3]) ++alone;
-    const int o1 = (alone + 1) & 3, o2 = (alone + 2) & 3, o3 = (alone + 3) & 3;
-    out[count++] = {alone, o1, 3, {bit(alone) | bit(o1), bit(alone) | bit(o2), bit(alone) | bit(o3), 0}};
-  } else if (same_count == 2) {   // two against two
-    const int a2 = labels[1] == labels[0] ? 1 : labels[2] == labels[0] ? 2 : 3;
-    const int b1 = a2 == 1 ? 2 : 1;
-    const int b2 = 6 - a2 - b1;
-    out[count++] = {0, b1, 4, {bit(0) | bit(b1), bit(0) | bit(b2), bit(a2) | bit(b2), bit(a2) | bit(b1)}};
-  } else if (same_count == 1) {   // a, b, and two of c
-    const int c1 = same_a, c2 = same_b;
-    int a = 0;
-    while (a == c1 || a == c2) ++a;
-    const int b = 6 - c1 - c2 - a;
-    const Between f1 = bit(a) | bit(b) | bit(c1), f2 = bit(a) | bit(b) | bit(c2);
-    out[count++] = {a, b, 3, {bit(a) | bit(b), f1, f2, 0}};
-    out[count++] = {a, c1, 4, {bit(a) | bit(c1), bit(a) | bit(c2), f2, f1}};
-    out[count++] = {b, c1, 4, {bit(b) | bit(c1), bit(b) | bit(c2), f2, f1}};
-  } else {   // four labels
-    for (int i = 0; i < 4; ++i) {
-      for (int j = i + 1; j < 4; ++j) {
-        const Between others = all & ~(bit(i) | bit(j));
-        const Between k = others & (~others + 1U), l = others & ~k;
-        out[count++] = {i, j, 4, {bit(i) | bit(j), bit(i) | bit(j) | k, all, bit(i) | bit(j) | l}};
-      }
-    }
-  }
-  return count;
-}
-
-Vec3 offset_of(unsigned mask) {
-  return {static_cast<double>(mask & 1U), static_cast<double>((mask >> 1) & 1U), static_cast<double>((mask >> 2) & 1U)};
-}
-
-/// True if the polygon, of vertices in the middle of their corners, turns counter-clockwise seen from b.
-bool faces_b(const Polygon& polygon, const std::array<unsigned, 4>& masks) {
-  const auto middle = [&](Between set) {
-    Vec3 sum = Vec3::Zero();
-    double n = 0.0;
-    for (int i = 0; i < 4; ++i) {
-      if ((set & bit(i)) != 0) sum += offset_of(masks[i]), n += 1.0;
-    }
-    return Vec3(sum / n);
-  };
-  const Vec3 first = middle(polygon.vertices[0]);
-  const Vec3 normal = (middle(polygon.vertices[1]) - first).cross(middle(polygon.vertices[2]) - first);
-  return normal.dot(offset_of(masks[polygon.b]) - offset_of(masks[polygon.a])) > 0.0;
+  const double length = std::sqrt(slope.squaredNorm());
+  return length > 0.0 ? Vec3(slope / length) : Vec3(0.0, 0.0, 1.0);
 }
 
 /// Corners of a `Between`, in the order of the chain.
@@ -265,7 +223,7 @@ struct Chain {
 Chain chain_of(Between set, const std::array<unsigned, 4>& masks) {
   Chain chain;
   for (int i = 0; i < 4; ++i) {
-    if ((set & bit(i)) != 0) chain.masks[chain.size++] = masks[i];
+    if ((set & corner_bit(i)) != 0) chain.masks[chain.size++] = masks[i];
   }
   return chain;
 }
@@ -293,70 +251,8 @@ Vec3 vertex_position(const TileWork& tile, const Corner& base, const Chain& chai
 
 }  // namespace
 
-namespace {
-
-Box box_of(const Colony& colony) {
-  CHECK(!colony.cells().empty());
-  Box all = colony.body(colony.cells().front().id).box();
-  for (const Cell& cell : colony.cells()) {
-    const Box box = colony.body(cell.id).box();
-    all.low = all.low.cwiseMin(box.low);
-    all.high = all.high.cwiseMax(box.high);
-  }
-  return all;
-}
-
-}  // namespace
-
-double pitch_min_um(const Colony& colony) {
-  const Box all = box_of(colony);
-  constexpr std::int64_t kSpare = 3 * kTileCubes;
-  return std::max({(all.high.x() - all.low.x()) / static_cast<double>(kNodesMax - kSpare),
-                   (all.high.y() - all.low.y()) / static_cast<double>(kNodesMax - kSpare),
-                   all.high.z() / static_cast<double>(kLevelsMax - kSpare)});
-}
-
-MeshGrid grid_of(const Colony& colony, double pitch_um) {
-  const Box all = box_of(colony);
-  CHECK(pitch_um > 0.0 && pitch_um >= pitch_min_um(colony));
-  MeshGrid grid;
-  grid.pitch_um = pitch_um;
-  grid.first_x = floor_to_int(all.low.x() / pitch_um) - 1;
-  grid.first_y = floor_to_int(all.low.y() / pitch_um) - 1;
-  grid.levels = ceil_to_int(all.high.z() / pitch_um) + 3;
-  return grid;
-}
-
-std::vector<TileCells> tiles_of(const Colony& colony, const MeshGrid& grid) {
-  struct Entry {
-    std::int64_t y, x;
-    CellId id;
-    auto operator<=>(const Entry&) const = default;
-  };
-  std::vector<Entry> entries;
-  const double tile_um = grid.pitch_um * static_cast<double>(kTileCubes);
-  const Vec3 origin = grid.position_um(0, 0, 0);
-  for (const Cell& cell : colony.cells()) {
-    const Box box = colony.body(cell.id).box();
-    if (box.empty()) continue;
-    // One pitch more on each side: a vertex may be asked for beside a body.
-    const auto tile = [&](double at_um) { return std::max<std::int64_t>(0, floor_to_int(at_um / tile_um)); };
-    const std::int64_t x_end = tile(box.high.x() + grid.pitch_um - origin.x()) + 1;
-    const std::int64_t y_end = tile(box.high.y() + grid.pitch_um - origin.y()) + 1;
-    for (std::int64_t y = tile(box.low.y() - grid.pitch_um - origin.y()); y < y_end; ++y) {
-      for (std::int64_t x = tile(box.low.x() - grid.pitch_um - origin.x()); x < x_end; ++x) entries.push_back({y, x, cell.id});
-    }
-  }
-  std::sort(entries.begin(), entries.end());
-  std::vector<TileCells> tiles;
-  for (const Entry& entry : entries) {
-    if (tiles.empty() || tiles.back().x != entry.x || tiles.back().y != entry.y) tiles.push_back({entry.x, entry.y, {}});
-    tiles.back().ids.push_back(entry.id);
-  }
-  return tiles;
-}
-
-std::uint64_t count_part_triangles(const Colony& colony, ContactRule rule, const MeshGrid& grid, const TileCells& cells) {
+std::uint64_t count_part_triangles(const Colony& colony, ContactRule rule, const MeshGrid& grid,
+                                   const TileCells& cells) {
   const TileWork tile(colony, rule, grid, cells);
   std::uint64_t count = 0;
   std::array<Polygon, 6> polygons{};
@@ -384,22 +280,23 @@ BorderTile border_of_tile(const Colony& colony, ContactRule rule, const MeshGrid
   std::vector<Use> uses;
   std::vector<Piece> pieces;
   std::array<Polygon, 6> polygons{};
-  tile.for_each_mixed([&](const Corner& base, const std::array<unsigned, 4>& masks, const std::array<std::uint32_t, 4>& labels) {
-    const int n = polygons_of(labels, polygons);
-    for (int i = 0; i < n; ++i) {
-      Polygon polygon = polygons[i];
-      if (!faces_b(polygon, masks)) std::swap(polygon.a, polygon.b);
-      std::array<std::uint64_t, 4> keys{};
-      for (int v = 0; v < polygon.size; ++v) {
-        const Chain chain = chain_of(polygon.vertices[v], masks);
-        keys[v] = vertex_key(base, chain);
-        uses.push_back({keys[v], base, chain});
-      }
-      for (int v = 2; v < polygon.size; ++v) {
-        pieces.push_back({labels[polygon.a], labels[polygon.b], {keys[0], keys[v - 1], keys[v]}});
-      }
-    }
-  });
+  tile.for_each_mixed(
+      [&](const Corner& base, const std::array<unsigned, 4>& masks, const std::array<std::uint32_t, 4>& labels) {
+        const int n = polygons_of(labels, polygons);
+        for (int i = 0; i < n; ++i) {
+          Polygon polygon = polygons[i];
+          if (!faces_b(polygon, masks)) std::swap(polygon.a, polygon.b);
+          std::array<std::uint64_t, 4> keys{};
+          for (int v = 0; v < polygon.size; ++v) {
+            const Chain chain = chain_of(polygon.vertices[v], masks);
+            keys[v] = vertex_key(base, chain);
+            uses.push_back({keys[v], base, chain});
+          }
+          for (int v = 2; v < polygon.size; ++v) {
+            pieces.push_back({labels[polygon.a], labels[polygon.b], {keys[0], keys[v - 1], keys[v]}});
+          }
+        }
+      });
   std::sort(uses.begin(), uses.end(), [](const Use& l, const Use& r) { return l.key < r.key; });
   BorderTile border;
   for (std::size_t i = 0; i < uses.size(); ++i) {
@@ -407,13 +304,25 @@ BorderTile border_of_tile(const Colony& colony, ContactRule rule, const MeshGrid
     // Every use of a key names the same corners: which one is taken cannot matter.
     const Vec3 p = vertex_position(tile, uses[i].base, uses[i].chain);
     border.keys.push_back(uses[i].key);
-    for (int axis = 0; axis < 3; ++axis) border.positions_um.push_back(static_cast<float>(p[axis]));
+    Vec3 normal = Vec3::Zero();
+    std::uint32_t inside = 0;
+    if (uses[i].chain.size == 2) {
+      const Corner from = uses[i].base.plus(uses[i].chain.masks[0]), to = uses[i].base.plus(uses[i].chain.masks[1]);
+      inside = tile.inside_of(from, to);
+      normal = tile.normal_at(from, to, p);
+    }
+    border.inside.push_back(inside);
+    for (int axis = 0; axis < 3; ++axis) {
+      border.positions_um.push_back(static_cast<float>(p[axis]));
+      border.normals.push_back(static_cast<float>(normal[axis]));
+    }
   }
   border.triangles.reserve(pieces.size());
   for (const Piece& piece : pieces) {
     BorderTriangle triangle{piece.a, piece.b, {}};
     for (int v = 0; v < 3; ++v) {
-      const auto found = std::lower_bound(border.keys.begin(), border.keys.end(), piece.keys[static_cast<std::size_t>(v)]);
+      const auto found =
+          std::lower_bound(border.keys.begin(), border.keys.end(), piece.keys[static_cast<std::size_t>(v)]);
       triangle.vertex[v] = static_cast<std::uint32_t>(found - border.keys.begin());
     }
     border.triangles.push_back(triangle);

@@ -9,9 +9,9 @@
 namespace colony {
 namespace {
 
-constexpr int kRaySteps = 8;       // a membrane fold thinner than an eighth of the nucleus is stepped over
+constexpr int kRaySteps = 8;  // a membrane fold thinner than an eighth of the nucleus is stepped over
 constexpr int kHalvings = 6;
-constexpr double kInset = 0.98;    // of a ray cut short: the surface of the cell is made of flat triangles
+constexpr double kInset = 0.98;  // of a ray cut short: the surface of the cell is made of flat triangles
 
 }  // namespace
 
@@ -20,12 +20,14 @@ Sphere sphere_of(int level) {
   const double t = 0.5 * (1.0 + std::sqrt(5.0));
   const double scale = 1.0 / std::sqrt(1.0 + t * t);
   Sphere sphere;
-  for (const Vec3& v : {Vec3(-1, t, 0), Vec3(1, t, 0), Vec3(-1, -t, 0), Vec3(1, -t, 0), Vec3(0, -1, t), Vec3(0, 1, t), Vec3(0, -1, -t),
-                        Vec3(0, 1, -t), Vec3(t, 0, -1), Vec3(t, 0, 1), Vec3(-t, 0, -1), Vec3(-t, 0, 1)}) {
+  for (const Vec3& v :
+       {Vec3(-1, t, 0), Vec3(1, t, 0), Vec3(-1, -t, 0), Vec3(1, -t, 0), Vec3(0, -1, t), Vec3(0, 1, t), Vec3(0, -1, -t),
+        Vec3(0, 1, -t), Vec3(t, 0, -1), Vec3(t, 0, 1), Vec3(-t, 0, -1), Vec3(-t, 0, 1)}) {
     sphere.vertices.push_back(v * scale);
   }
-  sphere.triangles = {{0, 11, 5}, {0, 5, 1}, {0, 1, 7}, {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4}, {11, 10, 2}, {10, 7, 6}, {7, 1, 8},
-                      {3, 9, 4}, {3, 4, 2}, {3, 2, 6}, {3, 6, 8}, {3, 8, 9}, {4, 9, 5}, {2, 4, 11}, {6, 2, 10}, {8, 6, 7}, {9, 8, 1}};
+  sphere.triangles = {{0, 11, 5},  {0, 5, 1},  {0, 1, 7},  {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4},
+                      {11, 10, 2}, {10, 7, 6}, {7, 1, 8},  {3, 9, 4},  {3, 4, 2},   {3, 2, 6}, {3, 6, 8},
+                      {3, 8, 9},   {4, 9, 5},  {2, 4, 11}, {6, 2, 10}, {8, 6, 7},   {9, 8, 1}};
   for (int i = 0; i < level; ++i) {
     // Middles of edges by their ends, lower index first; found again by search, since there are few.
     std::vector<std::pair<std::uint64_t, std::uint32_t>> middles;
@@ -43,7 +45,9 @@ Sphere sphere_of(int level) {
       sphere.vertices.push_back(sum / std::sqrt(sum.squaredNorm()));
     }
     const auto middle = [&](std::uint64_t a, std::uint64_t b) {
-      return std::lower_bound(middles.begin(), middles.end(), std::pair(std::min(a, b) << 32 | std::max(a, b), std::uint32_t{0}))->second;
+      return std::lower_bound(middles.begin(), middles.end(),
+                              std::pair(std::min(a, b) << 32 | std::max(a, b), std::uint32_t{0}))
+          ->second;
     };
     std::vector<std::array<std::uint32_t, 3>> finer;
     for (const auto& [a, b, c] : sphere.triangles) {
@@ -55,8 +59,8 @@ Sphere sphere_of(int level) {
   return sphere;
 }
 
-std::vector<Vec3> nucleus_vertices(const Cell& cell, const Body& body, std::span<const Body* const> neighbours, ContactRule rule,
-                                   const Sphere& sphere) {
+std::vector<Vec3> nucleus_vertices(const Cell& cell, const Body& body, std::span<const Body* const> neighbours,
+                                   ContactRule rule, const Sphere& sphere) {
   const auto inside = [&](const Vec3& p) { return p.z() >= 0.0 && deformed_field(body, neighbours, rule, p) >= 0.0; };
   if (!inside(cell.nucleus_um)) return {};
   const Vec3 radii(cell.nucleus_radius_um, cell.nucleus_radius_um, nucleus_half_height_um(cell));

@@ -21,7 +21,7 @@ struct Sphere {
 Sphere sphere_of(int level);
 
 /// The vertices of the nucleus in the order of the sphere's; none if the nucleus's centre is not in the deformed cell.
-std::vector<Vec3> nucleus_vertices(const Cell& cell, const Body& body, std::span<const Body* const> neighbours, ContactRule rule,
-                                   const Sphere& sphere);
+std::vector<Vec3> nucleus_vertices(const Cell& cell, const Body& body, std::span<const Body* const> neighbours,
+                                   ContactRule rule, const Sphere& sphere);
 
 }  // namespace colony

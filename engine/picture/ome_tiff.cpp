@@ -4,9 +4,8 @@
 #include <charconv>
 #include <cstring>
 #include <memory>
-#include <vector>
-
 #include <tiffio.h>
+#include <vector>
 #include <zlib.h>
 
 #include "engine/base/check.hpp"
@@ -48,19 +47,23 @@ std::string text_of(double value) {
 std::string ome_xml(const Frame& frame, const std::vector<Channel>& channels, int sample_bits) {
   const std::string schema = "http://www.openmicroscopy.org/Schemas/OME/2016-06";
   const std::string size_um = text_of(frame.um_per_px);
-  std::string xml = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<OME xmlns=\"" + schema +
-                    "\" xmlns:xsi=\"http://www.w3.org/2001/XMLSchema-instance\" xsi:schemaLocation=\"" + schema + " " + schema +
-                    "/ome.xsd\" Creator=\"colony\">\n <Image ID=\"Image:0\" Name=\"colony\">\n  <Pixels ID=\"Pixels:0\" "
-                    "DimensionOrder=\"XYCZT\" Type=\"uint" + std::to_string(sample_bits) + "\" BigEndian=\"false\" SizeX=\"" +
-                    std::to_string(frame.width_px) + "\" SizeY=\"" + std::to_string(frame.height_px) + "\" SizeC=\"" +
-                    std::to_string(channels.size()) + "\" SizeZ=\"1\" SizeT=\"1\" PhysicalSizeX=\"" + size_um +
-                    "\" PhysicalSizeXUnit=\"&#181;m\" PhysicalSizeY=\"" + size_um + "\" PhysicalSizeYUnit=\"&#181;m\">\n";
+  std::string xml =
+      "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<OME xmlns=\"" + schema +
+      "\" xmlns:xsi=\"http://www.w3.org/2001/XMLSchema-instance\" xsi:schemaLocation=\"" + schema + " " + schema +
+      "/ome.xsd\" Creator=\"colony\">\n <Image ID=\"Image:0\" Name=\"colony\">\n  <Pixels ID=\"Pixels:0\" "
+      "DimensionOrder=\"XYCZT\" Type=\"uint" +
+      std::to_string(sample_bits) + "\" BigEndian=\"false\" SizeX=\"" + std::to_string(frame.width_px) + "\" SizeY=\"" +
+      std::to_string(frame.height_px) + "\" SizeC=\"" + std::to_string(channels.size()) +
+      "\" SizeZ=\"1\" SizeT=\"1\" PhysicalSizeX=\"" + size_um + "\" PhysicalSizeXUnit=\"&#181;m\" PhysicalSizeY=\"" +
+      size_um + "\" PhysicalSizeYUnit=\"&#181;m\">\n";
   for (std::size_t i = 0; i < channels.size(); ++i) {
-    xml += "   <Channel ID=\"Channel:0:" + std::to_string(i) + "\" Name=\"" + name_of(channels[i]) + "\" SamplesPerPixel=\"1\"/>\n";
+    xml += "   <Channel ID=\"Channel:0:" + std::to_string(i) + "\" Name=\"" + name_of(channels[i]) +
+           "\" SamplesPerPixel=\"1\"/>\n";
   }
   for (std::size_t i = 0; i < channels.size(); ++i) {
     const std::string number = std::to_string(i);
-    xml += "   <TiffData IFD=\"" + number + "\" FirstC=\"" + number + "\" FirstZ=\"0\" FirstT=\"0\" PlaneCount=\"1\"/>\n";
+    xml +=
+        "   <TiffData IFD=\"" + number + "\" FirstC=\"" + number + "\" FirstZ=\"0\" FirstT=\"0\" PlaneCount=\"1\"/>\n";
   }
   return xml + "  </Pixels>\n </Image>\n</OME>\n";
 }
@@ -98,7 +101,7 @@ toff_t seek_to(thandle_t user, toff_t offset, int whence) {
 }
 int close_nothing(thandle_t) { return 0; }
 toff_t size_of(thandle_t user) { return handle_of(user).file.size(); }
-int keep_quiet(TIFF*, void*, const char*, const char*, va_list) { return 1; }   // a refusal is returned, not printed
+int keep_quiet(TIFF*, void*, const char*, const char*, va_list) { return 1; }  // a refusal is returned, not printed
 
 // Not TIFFClose: that would write, also where writing has failed or was stopped.
 struct Abandon {
@@ -107,19 +110,21 @@ struct Abandon {
 using Tiff = std::unique_ptr<TIFF, Abandon>;
 
 Tiff open_tiff(Handle& handle, bool big) {
-  const std::unique_ptr<TIFFOpenOptions, void (*)(TIFFOpenOptions*)> options(TIFFOpenOptionsAlloc(), TIFFOpenOptionsFree);
+  const std::unique_ptr<TIFFOpenOptions, void (*)(TIFFOpenOptions*)> options(TIFFOpenOptionsAlloc(),
+                                                                             TIFFOpenOptionsFree);
   CHECK(options != nullptr);
   TIFFOpenOptionsSetErrorHandlerExtR(options.get(), keep_quiet, nullptr);
   TIFFOpenOptionsSetWarningHandlerExtR(options.get(), keep_quiet, nullptr);
-  return Tiff(TIFFClientOpenExt("colony", big ? "wl8" : "wl", &handle, read_at, write_at, seek_to, close_nothing, size_of, nullptr, nullptr,
-                                options.get()));
+  return Tiff(TIFFClientOpenExt("colony", big ? "wl8" : "wl", &handle, read_at, write_at, seek_to, close_nothing,
+                                size_of, nullptr, nullptr, options.get()));
 }
 
 bool set_tags(TIFF* tiff, const Frame& frame, int sample_bits, const std::string& description) {
   const auto per_cm = static_cast<float>(kUmPerCm / frame.um_per_px);
   return TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, static_cast<std::uint32_t>(frame.width_px)) == 1 &&
          TIFFSetField(tiff, TIFFTAG_IMAGELENGTH, static_cast<std::uint32_t>(frame.height_px)) == 1 &&
-         TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, sample_bits) == 1 && TIFFSetField(tiff, TIFFTAG_SAMPLESPERPIXEL, 1) == 1 &&
+         TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, sample_bits) == 1 &&
+         TIFFSetField(tiff, TIFFTAG_SAMPLESPERPIXEL, 1) == 1 &&
          TIFFSetField(tiff, TIFFTAG_SAMPLEFORMAT, SAMPLEFORMAT_UINT) == 1 &&
          TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK) == 1 &&
          TIFFSetField(tiff, TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG) == 1 &&
@@ -135,11 +140,12 @@ bool set_tags(TIFF* tiff, const Frame& frame, int sample_bits, const std::string
 // ---- samples ----
 
 /// One value a pixel of the rows.
-std::vector<std::uint32_t> samples_of(const Colony& colony, ContactRule rule, const Frame& frame, Channel channel, RowRange rows,
-                                      const Effort& effort) {
+std::vector<std::uint32_t> samples_of(const Colony& colony, ContactRule rule, const Frame& frame, Channel channel,
+                                      RowRange rows, const Effort& effort) {
   if (channel == Channel::kLabels) return top_view(colony, frame, rows, effort).owner;
   const PathView view = path_lengths(colony, rule, frame, rows, effort);
-  const std::vector<float> intensity = channel == Channel::kPhase ? phase_contrast(colony, rule, view, effort) : std::vector<float>();
+  const std::vector<float> intensity =
+      channel == Channel::kPhase ? phase_contrast(colony, rule, view, effort) : std::vector<float>();
   std::vector<std::uint32_t> samples(view.cell_um.size());
   for_each_piece(static_cast<std::size_t>(rows.end - rows.first), effort, [&](std::size_t row) {
     const std::size_t begin = row * static_cast<std::size_t>(frame.width_px);
@@ -159,22 +165,25 @@ std::vector<std::uint32_t> samples_of(const Colony& colony, ContactRule rule, co
 std::string packed(std::span<const std::uint32_t> samples, int sample_bits) {
   const auto width = static_cast<std::size_t>(sample_bits / 8);
   std::string plain(samples.size() * width, '\0');
-  for (std::size_t i = 0; i < samples.size(); ++i) std::memcpy(plain.data() + i * width, &samples[i], width);   // little endian (digest.hpp)
+  for (std::size_t i = 0; i < samples.size(); ++i)
+    std::memcpy(plain.data() + i * width, &samples[i], width);  // little endian (digest.hpp)
   uLongf size = compressBound(plain.size());
   std::string bytes(size, '\0');
-  CHECK(compress2(reinterpret_cast<Bytef*>(bytes.data()), &size, reinterpret_cast<const Bytef*>(plain.data()), plain.size(),
-                  kCompressionLevel) == Z_OK);
+  CHECK(compress2(reinterpret_cast<Bytef*>(bytes.data()), &size, reinterpret_cast<const Bytef*>(plain.data()),
+                  plain.size(), kCompressionLevel) == Z_OK);
   bytes.resize(size);
   return bytes;
 }
 
-bool write_plane(TIFF* tiff, const Colony& colony, ContactRule rule, const Frame& frame, Channel channel, int sample_bits,
-                 const Effort& effort) {
-  const std::int64_t chunk_rows = std::clamp<std::int64_t>(kChunkPixels / frame.width_px / kTiffStripRows_px, 1, 8) * kTiffStripRows_px;
+bool write_plane(TIFF* tiff, const Colony& colony, ContactRule rule, const Frame& frame, Channel channel,
+                 int sample_bits, const Effort& effort) {
+  const std::int64_t chunk_rows =
+      std::clamp<std::int64_t>(kChunkPixels / frame.width_px / kTiffStripRows_px, 1, 8) * kTiffStripRows_px;
   for (std::int64_t first = 0; first < frame.height_px; first += chunk_rows) {
     const RowRange rows{first, std::min(first + chunk_rows, frame.height_px)};
     const std::vector<std::uint32_t> samples = samples_of(colony, rule, frame, channel, rows, effort);
-    std::vector<std::string> strips(static_cast<std::size_t>((rows.end - rows.first + kTiffStripRows_px - 1) / kTiffStripRows_px));
+    std::vector<std::string> strips(
+        static_cast<std::size_t>((rows.end - rows.first + kTiffStripRows_px - 1) / kTiffStripRows_px));
     for_each_piece(strips.size(), effort, [&](std::size_t index) {
       const std::size_t length = static_cast<std::size_t>(kTiffStripRows_px * frame.width_px);
       const std::size_t begin = index * length;
@@ -203,8 +212,8 @@ bool MemoryFile::read(std::uint64_t offset, std::span<char> bytes) {
   return true;
 }
 
-Status write_ome_tiff(const Colony& colony, const Params& params, const PictureSpec& spec, const OmeChannels& chosen, const Effort& effort,
-                      RandomAccessFile& file) {
+Status write_ome_tiff(const Colony& colony, const Params& params, const PictureSpec& spec, const OmeChannels& chosen,
+                      const Effort& effort, RandomAccessFile& file) {
   const Result<Frame> framed = frame_of(colony, spec);
   if (!framed) return framed.error();
   const Frame& frame = *framed;
@@ -214,18 +223,21 @@ Status write_ome_tiff(const Colony& colony, const Params& params, const PictureS
   if (chosen.nuclei) channels.push_back(Channel::kNuclei);
   if (chosen.labels) channels.push_back(Channel::kLabels);
   if (channels.empty()) {
-    return Error{ErrorCode::kInvalid, "the picture cannot be written", {FieldError{"channels", "must name at least one channel"}}};
+    return Error{ErrorCode::kInvalid,
+                 "the picture cannot be written",
+                 {FieldError{"channels", "must name at least one channel"}}};
   }
   const int sample_bits = chosen.labels && colony.cells().size() > 65535 ? 32 : 16;
   const std::uint64_t bytes = static_cast<std::uint64_t>(frame.width_px) * static_cast<std::uint64_t>(frame.height_px) *
                               static_cast<std::uint64_t>(sample_bits / 8) * channels.size();
   const Error refused{ErrorCode::kStorage, "the file could not be written", {}};
   Handle handle{file};
-  const Tiff tiff = open_tiff(handle, bytes > kClassicBytesMax);
+  const Tiff tiff = open_tiff(handle, chosen.big || bytes > kClassicBytesMax);
   if (!tiff) return refused;
   for (std::size_t i = 0; i < channels.size(); ++i) {
     if (!set_tags(tiff.get(), frame, sample_bits, i == 0 ? ome_xml(frame, channels, sample_bits) : std::string()) ||
-        !write_plane(tiff.get(), colony, params.contact.rule, frame, channels[i], sample_bits, effort) || TIFFWriteDirectory(tiff.get()) != 1) {
+        !write_plane(tiff.get(), colony, params.contact.rule, frame, channels[i], sample_bits, effort) ||
+        TIFFWriteDirectory(tiff.get()) != 1) {
       return refused;
     }
   }

@@ -13,10 +13,10 @@ constexpr double kReachPerSigma = 3.0;
 
 /// The coarse raster of K * phi that some rows of a frame need.
 struct Halo {
-  std::int64_t pixels = 1;         // of the frame in one of the raster
-  std::int64_t reach = 0;          // of the kernel, coarse pixels
-  Frame frame;                     // of phi: wider than the picture by reach + 1 on each side
-  std::vector<double> weights;     // -reach..reach, sum 1
+  std::int64_t pixels = 1;      // of the frame in one of the raster
+  std::int64_t reach = 0;       // of the kernel, coarse pixels
+  Frame frame;                  // of phi: wider than the picture by reach + 1 on each side
+  std::vector<double> weights;  // -reach..reach, sum 1
 
   explicit Halo(const Frame& picture) {
     pixels = std::max<std::int64_t>(1, floor_to_int(kHaloSigma_um * kPitchPerSigma / picture.um_per_px));
@@ -50,8 +50,10 @@ struct Blurred {
     const double down = row - static_cast<double>(r), right = column - static_cast<double>(c);
     const float* upper = values.data() + (r - first_row) * width_px + c;
     const float* lower = upper + width_px;
-    const double top = static_cast<double>(upper[0]) + right * (static_cast<double>(upper[1]) - static_cast<double>(upper[0]));
-    const double bottom = static_cast<double>(lower[0]) + right * (static_cast<double>(lower[1]) - static_cast<double>(lower[0]));
+    const double top =
+        static_cast<double>(upper[0]) + right * (static_cast<double>(upper[1]) - static_cast<double>(upper[0]));
+    const double bottom =
+        static_cast<double>(lower[0]) + right * (static_cast<double>(lower[1]) - static_cast<double>(lower[0]));
     return top + down * (bottom - top);
   }
 };
@@ -68,11 +70,13 @@ Blurred blurred_phase(const Colony& colony, ContactRule rule, const Halo& halo, 
     const float* cell = paths.cell_um.data() + static_cast<std::int64_t>(index) * width;
     const float* nucleus = paths.nucleus_um.data() + static_cast<std::int64_t>(index) * width;
     std::vector<double> phase(static_cast<std::size_t>(width));
-    for (std::size_t c = 0; c < phase.size(); ++c) phase[c] = phase_rad(static_cast<double>(cell[c]), static_cast<double>(nucleus[c]));
+    for (std::size_t c = 0; c < phase.size(); ++c)
+      phase[c] = phase_rad(static_cast<double>(cell[c]), static_cast<double>(nucleus[c]));
     float* to = along.data() + static_cast<std::int64_t>(index) * width;
     for (std::int64_t c = halo.reach; c < width - halo.reach; ++c) {
       double sum = 0.0;
-      for (std::int64_t i = 0; i < taps; ++i) sum += halo.weights[static_cast<std::size_t>(i)] * phase[static_cast<std::size_t>(c - halo.reach + i)];
+      for (std::int64_t i = 0; i < taps; ++i)
+        sum += halo.weights[static_cast<std::size_t>(i)] * phase[static_cast<std::size_t>(c - halo.reach + i)];
       to[c] = static_cast<float>(sum);
     }
   });
@@ -97,12 +101,14 @@ Blurred blurred_phase(const Colony& colony, ContactRule rule, const Halo& halo, 
 
 double transmission(int colour, double cell_um, double nucleus_um) {
   const auto at = static_cast<std::size_t>(colour);
-  const double depth = kCytoplasmAbsorption_per_um[at] * (cell_um - nucleus_um) + kNucleusAbsorption_per_um[at] * nucleus_um;
+  const double depth =
+      kCytoplasmAbsorption_per_um[at] * (cell_um - nucleus_um) + kNucleusAbsorption_per_um[at] * nucleus_um;
   return maths::exp(-std::min(depth, 700.0));
 }
 
 double phase_rad(double cell_um, double nucleus_um) {
-  return 2.0 * maths::kPi / kWavelength_um * (kCytoplasmIndexExcess * (cell_um - nucleus_um) + kNucleusIndexExcess * nucleus_um);
+  return 2.0 * maths::kPi / kWavelength_um *
+         (kCytoplasmIndexExcess * (cell_um - nucleus_um) + kNucleusIndexExcess * nucleus_um);
 }
 
 std::vector<float> phase_contrast(const Colony& colony, ContactRule rule, const PathView& view, const Effort& effort) {

@@ -15,7 +15,7 @@ void for_each_piece(std::size_t count, const Effort& effort, const std::function
   CHECK(effort.threads >= 1 && effort.threads <= kWorkThreadsMax);
   std::atomic<std::size_t> next = 0;
   std::mutex mutex;
-  std::exception_ptr thrown;   // the first one; guarded by mutex
+  std::exception_ptr thrown;  // the first one; guarded by mutex
   const auto take = [&] {
     try {
       for (std::size_t index = next.fetch_add(1); index < count; index = next.fetch_add(1)) {

@@ -42,7 +42,9 @@ struct Group {
   float dz;
   PathBuffer* buffer;
 
-  float* lanes(std::size_t active, Slot slot) const { return buffer->lanes.data() + (active * kSlots + slot) * kWidest; }
+  float* lanes(std::size_t active, Slot slot) const {
+    return buffer->lanes.data() + (active * kSlots + slot) * kWidest;
+  }
   V load(std::size_t active, Slot slot) const { return hn::LoadU(D(), lanes(active, slot)); }
   void store(std::size_t active, Slot slot, V value) const { hn::StoreU(value, D(), lanes(active, slot)); }
 
@@ -65,9 +67,10 @@ void Group::prepare(V x, V y) const {
     const V w = row(m + 6, b.field.t[2], x, y, zero);
     // Along the column the smooth field is the parabola peak - step2 (z - middle)^2.
     const float step2 = m[2] * m[2] + m[5] * m[5] + m[8] * m[8];
-    const V slope = hn::Add(hn::Add(hn::Mul(u, constant(m[2])), hn::Mul(v, constant(m[5]))), hn::Mul(w, constant(m[8])));
+    const V slope =
+        hn::Add(hn::Add(hn::Mul(u, constant(m[2])), hn::Mul(v, constant(m[5]))), hn::Mul(w, constant(m[8])));
     const V peak = hn::Add(smooth_field(u, v, w), hn::Div(hn::Mul(slope, slope), constant(step2)));
-    const V above = hn::Add(peak, constant(b.field.band + 1e-3F));   // the slack is for rounding alone
+    const V above = hn::Add(peak, constant(b.field.band + 1e-3F));  // the slack is for rounding alone
     const auto near = hn::Ge(above, zero);
     if (hn::AllFalse(d, near)) continue;
     const V middle = hn::Div(hn::Neg(slope), constant(step2));
@@ -184,7 +187,8 @@ void Group::add_interval(std::size_t level) const {
       if (!largest_only && positive_count > 2) {
         // Where one neighbour alone takes, f_i - f_j has said it all.
         const auto several = hn::Or(hn::Gt(sum_from, most_from), hn::Gt(sum_to, most_to));
-        cut(part, hn::IfThenElse(several, hn::Sub(from, sum_from), one), hn::IfThenElse(several, hn::Sub(to, sum_to), one));
+        cut(part, hn::IfThenElse(several, hn::Sub(from, sum_from), one),
+            hn::IfThenElse(several, hn::Sub(to, sum_to), one));
       }
     }
     store(i, kCell, hn::Add(load(i, kCell), hn::Mul(positive(hn::Sub(part.high, part.low)), constant(dz))));
@@ -200,8 +204,9 @@ void Group::add_interval(std::size_t level) const {
   }
 }
 
-void column_paths_kernel(std::span<const PathBody> bodies, bool largest_only, const float* HWY_RESTRICT x, float y, std::size_t n, float dz,
-                         PathBuffer& buffer, float* HWY_RESTRICT cell, float* HWY_RESTRICT nucleus) {
+void column_paths_kernel(std::span<const PathBody> bodies, bool largest_only, const float* HWY_RESTRICT x, float y,
+                         std::size_t n, float dz, PathBuffer& buffer, float* HWY_RESTRICT cell,
+                         float* HWY_RESTRICT nucleus) {
   const D d;
   const std::size_t lane_count = hn::Lanes(d);
   for (std::size_t i = 0; i < bodies.size() * kPathRun; ++i) cell[i] = nucleus[i] = 0.0F;

@@ -13,7 +13,7 @@ namespace {
 
 using kernel::kPathRun;
 constexpr auto kRun = static_cast<std::int64_t>(kPathRun);
-constexpr double kLevelsMax = 4096.0;   // of a column, whatever the cells
+constexpr double kLevelsMax = 4096.0;  // of a column, whatever the cells
 
 /// Distance of the levels: one for the whole colony, so that cells are cut at the same heights.
 double level_um(const Colony& colony) {
@@ -46,11 +46,11 @@ struct Lengths {
   const float* nucleus;
 };
 
-/// take(lengths) for every run of pixels of a band that a cell may meet. Tiles lie at multiples of kRun and kBandRows_px of the frame: a tile's
-/// origin, and so each rounding, is that of the pixel, not of the rows asked for.
+/// take(lengths) for every run of pixels of a band that a cell may meet. Tiles lie at multiples of kRun and kBandRows_px
+/// of the frame: a tile's origin, and so each rounding, is that of the pixel, not of the rows asked for.
 template <class Take>
-void scan_band(const Colony& colony, bool largest_only, const Frame& frame, double dz_um, RowRange band, std::span<const CellId> ids,
-               const Take& take) {
+void scan_band(const Colony& colony, bool largest_only, const Frame& frame, double dz_um, RowRange band,
+               std::span<const CellId> ids, const Take& take) {
   check_floating_point_mode();
   const std::int64_t tile_count = (frame.width_px + kRun - 1) / kRun;
   std::vector<std::vector<CellId>> of_tile(static_cast<std::size_t>(tile_count));
@@ -79,7 +79,8 @@ void scan_band(const Colony& colony, bool largest_only, const Frame& frame, doub
     const auto count = static_cast<std::size_t>(std::min(kRun, frame.width_px - column));
     for (std::int64_t row = band.first; row < band.end; ++row) {
       const auto y = static_cast<float>(-static_cast<double>(row - anchor_row) * frame.um_per_px);
-      kernel::column_paths(bodies, largest_only, x, y, count, static_cast<float>(dz_um), buffer, cell.data(), nucleus.data());
+      kernel::column_paths(bodies, largest_only, x, y, count, static_cast<float>(dz_um), buffer, cell.data(),
+                           nucleus.data());
       take(Lengths{row, column, count, here, cell.data(), nucleus.data()});
     }
   }
@@ -102,14 +103,15 @@ PathView path_lengths(const Colony& colony, ContactRule rule, const Frame& frame
   view.nucleus_um.assign(pixel_count, 0.0F);
   const double dz_um = level_um(colony);
   for_each_piece(cells.band_count(), effort, [&](std::size_t index) {
-    scan_band(colony, rule == ContactRule::kMax, frame, dz_um, cells.band(index), cells.of_band(index), [&](const Lengths& lengths) {
-      float* const cell_um = view.cell_um.data() + view.index(lengths.row, lengths.column);
-      float* const nucleus_um = view.nucleus_um.data() + view.index(lengths.row, lengths.column);
-      for (std::size_t i = 0; i < lengths.ids.size(); ++i) {
-        for (std::size_t c = 0; c < lengths.count; ++c) cell_um[c] += lengths.cell[i * kPathRun + c];
-        for (std::size_t c = 0; c < lengths.count; ++c) nucleus_um[c] += lengths.nucleus[i * kPathRun + c];
-      }
-    });
+    scan_band(colony, rule == ContactRule::kMax, frame, dz_um, cells.band(index), cells.of_band(index),
+              [&](const Lengths& lengths) {
+                float* const cell_um = view.cell_um.data() + view.index(lengths.row, lengths.column);
+                float* const nucleus_um = view.nucleus_um.data() + view.index(lengths.row, lengths.column);
+                for (std::size_t i = 0; i < lengths.ids.size(); ++i) {
+                  for (std::size_t c = 0; c < lengths.count; ++c) cell_um[c] += lengths.cell[i * kPathRun + c];
+                  for (std::size_t c = 0; c < lengths.count; ++c) nucleus_um[c] += lengths.nucleus[i * kPathRun + c];
+                }
+              });
   });
   return view;
 }
@@ -121,13 +123,15 @@ std::vector<double> path_volumes_um3(const Colony& colony, ContactRule rule, con
   // Bands sum for themselves; their sums are added in the order of the bands.
   std::vector<std::vector<std::pair<CellId, double>>> of_band(cells.band_count());
   for_each_piece(cells.band_count(), effort, [&](std::size_t index) {
-    scan_band(colony, rule == ContactRule::kMax, frame, dz_um, cells.band(index), cells.of_band(index), [&](const Lengths& lengths) {
-      for (std::size_t i = 0; i < lengths.ids.size(); ++i) {
-        double sum_um = 0.0;
-        for (std::size_t c = 0; c < lengths.count; ++c) sum_um += static_cast<double>(lengths.cell[i * kPathRun + c]);
-        if (sum_um > 0.0) of_band[index].emplace_back(lengths.ids[i], sum_um);
-      }
-    });
+    scan_band(colony, rule == ContactRule::kMax, frame, dz_um, cells.band(index), cells.of_band(index),
+              [&](const Lengths& lengths) {
+                for (std::size_t i = 0; i < lengths.ids.size(); ++i) {
+                  double sum_um = 0.0;
+                  for (std::size_t c = 0; c < lengths.count; ++c)
+                    sum_um += static_cast<double>(lengths.cell[i * kPathRun + c]);
+                  if (sum_um > 0.0) of_band[index].emplace_back(lengths.ids[i], sum_um);
+                }
+              });
   });
   std::vector<double> volumes_um3(colony.cells().size(), 0.0);
   const double area_um2 = frame.um_per_px * frame.um_per_px;

@@ -87,7 +87,8 @@ std::string encode_png(const Picture& picture) {
   return std::string(static_cast<const char*>(bytes.get()), size);
 }
 
-Status render_png(const Colony& colony, const Params& params, const PictureSpec& spec, const Effort& effort, const Take& take) {
+Status render_png(const Colony& colony, const Params& params, const PictureSpec& spec, const Effort& effort,
+                  const Take& take) {
   std::unique_ptr<spng_ctx, FreeContext> context;
   Hand hand{take, nullptr};
   return render_strips(colony, params, spec, effort, [&](const Picture& strip) {
@@ -95,7 +96,8 @@ Status render_png(const Colony& colony, const Params& params, const PictureSpec&
       context = png_context(strip);
       CHECK(spng_set_png_stream(context.get(), hand_over, &hand) == 0);
       set_header(context.get(), strip);
-      const int status = spng_encode_image(context.get(), nullptr, 0, SPNG_FMT_PNG, SPNG_ENCODE_PROGRESSIVE | SPNG_ENCODE_FINALIZE);
+      const int status =
+          spng_encode_image(context.get(), nullptr, 0, SPNG_FMT_PNG, SPNG_ENCODE_PROGRESSIVE | SPNG_ENCODE_FINALIZE);
       if (hand.thrown) std::rethrow_exception(hand.thrown);
       CHECK(status == 0);
     }

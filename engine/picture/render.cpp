@@ -118,8 +118,8 @@ void paint_bands(RowRange rows, const Effort& effort, const Paint& paint) {
   });
 }
 
-void paint_paths(const Colony& colony, ContactRule rule, PictureStyle style, const Frame& frame, RowRange rows, const Effort& effort,
-                 Picture& strip) {
+void paint_paths(const Colony& colony, ContactRule rule, PictureStyle style, const Frame& frame, RowRange rows,
+                 const Effort& effort, Picture& strip) {
   const PathView view = path_lengths(colony, rule, frame, rows, effort);
   if (style == PictureStyle::kBrightfield) {
     paint_bands(rows, effort, [&](RowRange band) { paint_brightfield(view, band, strip); });
@@ -130,9 +130,10 @@ void paint_paths(const Colony& colony, ContactRule rule, PictureStyle style, con
 }
 
 // The contact rule cannot change what is seen from above (top_view.hpp).
-void paint_surface(const Colony& colony, const PictureSpec& spec, const CellColours& colours, const Frame& frame, RowRange rows,
-                   const Effort& effort, Picture& strip) {
-  const RowRange read{std::max<std::int64_t>(0, rows.first - kStyleHalo_px), std::min(rows.end + kStyleHalo_px, frame.height_px)};
+void paint_surface(const Colony& colony, const PictureSpec& spec, const CellColours& colours, const Frame& frame,
+                   RowRange rows, const Effort& effort, Picture& strip) {
+  const RowRange read{std::max<std::int64_t>(0, rows.first - kStyleHalo_px),
+                      std::min(rows.end + kStyleHalo_px, frame.height_px)};
   const TopView view = top_view(colony, frame, read, effort);
   switch (spec.style) {
     case PictureStyle::kShaded:
@@ -152,7 +153,8 @@ Status render_strips(const Colony& colony, const Params& params, const PictureSp
   if (!framed) return framed.error();
   const Frame& frame = *framed;
   if (spec.style == PictureStyle::kLabels && colony.cells().size() >= kLabelColours) {
-    return refuse(ErrorCode::kLimit, "style", "labels as colours end at " + std::to_string(kLabelColours - 1) + " cells");
+    return refuse(ErrorCode::kLimit, "style",
+                  "labels as colours end at " + std::to_string(kLabelColours - 1) + " cells");
   }
   const bool shaded = spec.style == PictureStyle::kShaded;
   const CellColours colours = shaded ? colour_cells(colony, spec.colour_by) : CellColours{};

@@ -130,7 +130,8 @@ void paint_brightfield(const PathView& view, RowRange rows, Picture& picture) {
         continue;
       }
       const auto channel = [&](int colour) {
-        const double share = transmission(colour, static_cast<double>(view.cell_um[at]), static_cast<double>(view.nucleus_um[at]));
+        const double share =
+            transmission(colour, static_cast<double>(view.cell_um[at]), static_cast<double>(view.nucleus_um[at]));
         return static_cast<std::uint8_t>(255.0 * share + 0.5);
       };
       put_pixel(picture, row, column, {channel(0), channel(1), channel(2)});

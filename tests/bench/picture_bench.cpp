@@ -1,4 +1,5 @@
-// colony-picture-bench: grows one colony and times what engine/picture makes of it; each figure stands beside the digest of the answer.
+// colony-picture-bench: grows one colony and times what engine/picture makes of it; each figure stands beside the hash
+// of the answer.
 // Usage:  colony-picture-bench [--cells N] [--width PX] [--threads T] [--triangles N] [--out DIR]
 //         With --out the pictures, the OME-TIFF and the mesh (Wavefront OBJ) are written there, to be looked at.
 #include <algorithm>
@@ -100,7 +101,8 @@ std::string wavefront(const Mesh& mesh) {
     text += line;
   }
   for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
-    std::snprintf(line, sizeof line, "f %u %u %u\n", mesh.indices[i] + 1, mesh.indices[i + 1] + 1, mesh.indices[i + 2] + 1);
+    std::snprintf(line, sizeof line, "f %u %u %u\n", mesh.indices[i] + 1, mesh.indices[i + 1] + 1,
+                  mesh.indices[i + 2] + 1);
     text += line;
   }
   return text;
@@ -111,9 +113,13 @@ void run(const Options& options) {
   const Colony& colony = simulator.colony();
   const Params& params = simulator.spec().params;
   const Effort effort{options.threads, nullptr};
-  std::printf("cells %zu, digest %s\nwhat,threads,wall_s,cpu_s,bytes,digest\n", colony.cells().size(), colony.digest().hex().c_str());
-  const std::pair<const char*, PictureStyle> styles[] = {{"brightfield", PictureStyle::kBrightfield}, {"phase", PictureStyle::kPhase},
-    {"labels", PictureStyle::kLabels}, {"shaded", PictureStyle::kShaded}, {"contours", PictureStyle::kContours}};
+  std::printf("cells %zu, digest %s\nwhat,threads,wall_s,cpu_s,bytes,digest\n", colony.cells().size(),
+              colony.digest().hex().c_str());
+  const std::pair<const char*, PictureStyle> styles[] = {{"brightfield", PictureStyle::kBrightfield},
+                                                         {"phase", PictureStyle::kPhase},
+                                                         {"labels", PictureStyle::kLabels},
+                                                         {"shaded", PictureStyle::kShaded},
+                                                         {"contours", PictureStyle::kContours}};
   PictureSpec spec;
   spec.width_px = options.width_px;
   spec.side_max_px = kRasterSideMax_px;
@@ -124,7 +130,8 @@ void run(const Options& options) {
       picture = *render(colony, params, spec, effort);
       return bytes_of(picture.rgb.data(), picture.rgb.size());
     });
-    keep(options, std::string(name) + ".png", timed(std::string(name) + ".png", options, [&] { return encode_png(picture); }));
+    keep(options, std::string(name) + ".png",
+         timed(std::string(name) + ".png", options, [&] { return encode_png(picture); }));
   }
   spec.style = PictureStyle::kContours;
   spec.contour_lines = ContourLines::kColony;
@@ -142,11 +149,13 @@ void run(const Options& options) {
     return bytes_of(mesh.positions_um.data(), mesh.positions_um.size() * sizeof(float)) +
            bytes_of(mesh.indices.data(), mesh.indices.size() * sizeof(std::uint32_t));
   });
-  std::printf("mesh: %zu triangles, %zu vertices, grid %.3f um\n", mesh.indices.size() / 3, mesh.positions_um.size() / 3, mesh.pitch_um);
+  std::printf("mesh: %zu triangles, %zu vertices, grid %.3f um\n", mesh.indices.size() / 3,
+              mesh.positions_um.size() / 3, mesh.pitch_um);
   const std::vector<double> volumes = path_volumes_um3(colony, params.contact.rule, *frame_of(colony, spec), effort);
   double sum_um3 = 0.0;
   for (const double volume : volumes) sum_um3 += volume;
-  std::printf("mesh: volume %.0f um3, by path lengths %.0f um3, ratio %.4f\n", volume_um3(mesh), sum_um3, volume_um3(mesh) / sum_um3);
+  std::printf("mesh: volume %.0f um3, by path lengths %.0f um3, ratio %.4f\n", volume_um3(mesh), sum_um3,
+              volume_um3(mesh) / sum_um3);
   if (!options.out.empty()) keep(options, "colony.obj", wavefront(mesh));
 }
 
@@ -156,12 +165,18 @@ int main(int argc, char** argv) {
   Options options;
   for (int i = 1; i + 1 < argc; i += 2) {
     const std::string_view name = argv[i];
-    if (name == "--cells") options.cells = std::strtoull(argv[i + 1], nullptr, 10);
-    else if (name == "--width") options.width_px = std::strtoll(argv[i + 1], nullptr, 10);
-    else if (name == "--threads") options.threads = std::atoi(argv[i + 1]);
-    else if (name == "--triangles") options.triangles = std::strtoll(argv[i + 1], nullptr, 10);
-    else if (name == "--out") options.out = argv[i + 1];
-    else return std::fprintf(stderr, "colony-picture-bench: unknown option %s\n", argv[i]), 2;
+    if (name == "--cells")
+      options.cells = std::strtoull(argv[i + 1], nullptr, 10);
+    else if (name == "--width")
+      options.width_px = std::strtoll(argv[i + 1], nullptr, 10);
+    else if (name == "--threads")
+      options.threads = std::atoi(argv[i + 1]);
+    else if (name == "--triangles")
+      options.triangles = std::strtoll(argv[i + 1], nullptr, 10);
+    else if (name == "--out")
+      options.out = argv[i + 1];
+    else
+      return std::fprintf(stderr, "colony-picture-bench: unknown option %s\n", argv[i]), 2;
   }
   run(options);
   return 0;

@@ -6,10 +6,10 @@
 #include <cstring>
 #include <memory>
 #include <string>
+#include <tiffio.h>
 #include <vector>
 
 #include <gtest/gtest.h>
-#include <tiffio.h>
 
 #include "engine/picture/optics.hpp"
 #include "engine/picture/paths.hpp"
@@ -50,8 +50,9 @@ Tiff open(Source& source) {
     s.position = whence == SEEK_SET ? offset : whence == SEEK_CUR ? s.position + offset : s.bytes.size() + offset;
     return s.position;
   };
-  return Tiff(TIFFClientOpen("memory", "rm", &source, read, write, seek, [](thandle_t) { return 0; },
-                             [](thandle_t user) -> toff_t { return static_cast<Source*>(user)->bytes.size(); }, nullptr, nullptr),
+  return Tiff(TIFFClientOpen(
+                  "memory", "rm", &source, read, write, seek, [](thandle_t) { return 0; },
+                  [](thandle_t user) -> toff_t { return static_cast<Source*>(user)->bytes.size(); }, nullptr, nullptr),
               TIFFClose);
 }
 
@@ -136,7 +137,39 @@ TEST(OmeTiff, XmlSaysSizeTypeAndChannels) {
   EXPECT_NE(xml.find("Name=\"brightfield\""), std::string::npos);
   EXPECT_NE(xml.find("Name=\"labels\""), std::string::npos);
   EXPECT_EQ(xml.find("Name=\"phase\""), std::string::npos);
-  for (const char c : xml) ASSERT_TRUE(c == '\n' || (c >= ' ' && c <= '~'));   // the tag is ASCII
+  for (const char c : xml) ASSERT_TRUE(c == '\n' || (c >= ' ' && c <= '~'));  // the tag is ASCII
+}
+
+TEST(OmeTiff, BeyondSixteenBitsOfCellsSamplesHaveThirtyTwo) {
+  // A lattice of 65,792 cells, each a few coarse pixels; as BigTIFF, which nothing of a test's size would be by itself.
+  const Params params = testing::paper_without_noise();
+  std::vector<Cell> cells;
+  for (int row = 0; row < 256; ++row) {
+    for (int column = 0; column < 257; ++column) cells.push_back(testing::ball_at(16.0 * column, 16.0 * row, 6.0));
+  }
+  const Colony colony = found(params, cells);
+  OmeChannels channels{true, false, false, true};
+  channels.big = true;
+  MemoryFile file;
+  ASSERT_TRUE(write_ome_tiff(colony, params, of_scale(4.0), channels, Effort{2, nullptr}, file));
+  Source source{file.bytes()};
+  const Tiff tiff = open(source);
+  ASSERT_TRUE(tiff);
+  EXPECT_TRUE(TIFFIsBigTIFF(tiff.get()));
+  char* description = nullptr;
+  ASSERT_EQ(TIFFGetField(tiff.get(), TIFFTAG_IMAGEDESCRIPTION, &description), 1);
+  EXPECT_EQ(attribute(description, "Type"), "uint32");
+  ASSERT_EQ(TIFFSetDirectory(tiff.get(), 1), 1);
+  const Frame frame = *frame_of(colony, of_scale(4.0));
+  const TopView view = top_view(colony, frame);
+  std::vector<std::uint32_t> row(static_cast<std::size_t>(frame.width_px));
+  std::uint32_t greatest = 0;
+  for (std::int64_t y = 0; y < frame.height_px; ++y) {
+    ASSERT_EQ(TIFFReadScanline(tiff.get(), row.data(), static_cast<std::uint32_t>(y), 0), 1);
+    ASSERT_TRUE(std::equal(row.begin(), row.end(), view.owner.begin() + y * frame.width_px)) << y;
+    greatest = std::max(greatest, *std::max_element(row.begin(), row.end()));
+  }
+  EXPECT_EQ(greatest, 65792u);
 }
 
 TEST(OmeTiff, ThreadsCannotMatter) {
@@ -179,10 +212,13 @@ TEST(OmeTiff, RefusalsAreErrors) {
   EXPECT_FALSE(write_ome_tiff(colony, params, of_scale(0.5), OmeChannels{}, Effort{}, almost));
   MemoryFile file;
   OmeChannels none{false, false, false, false};
-  EXPECT_EQ(write_ome_tiff(colony, params, of_scale(0.5), none, Effort{}, file).error().fields.at(0).pointer, "channels");
-  EXPECT_EQ(write_ome_tiff(colony, params, of_scale(-1.0), OmeChannels{}, Effort{}, file).error().fields.at(0).pointer, "um_per_px");
+  EXPECT_EQ(write_ome_tiff(colony, params, of_scale(0.5), none, Effort{}, file).error().fields.at(0).pointer,
+            "channels");
+  EXPECT_EQ(write_ome_tiff(colony, params, of_scale(-1.0), OmeChannels{}, Effort{}, file).error().fields.at(0).pointer,
+            "um_per_px");
   const std::atomic<bool> stop = true;
-  EXPECT_THROW(static_cast<void>(write_ome_tiff(colony, params, of_scale(0.5), OmeChannels{}, Effort{1, &stop}, file)), Stopped);
+  EXPECT_THROW(static_cast<void>(write_ome_tiff(colony, params, of_scale(0.5), OmeChannels{}, Effort{1, &stop}, file)),
+               Stopped);
 }
 
 }  // namespace

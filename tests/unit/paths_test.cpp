@@ -1,11 +1,12 @@
-// Path lengths: chords of smooth bodies, the half-lens, shared faces under `max`, the definition by brute force, strips and threads.
+// Path lengths: chords of smooth bodies, the half-lens, shared faces under `max`, the definition by brute force, strips,
+// threads, vector widths.
 #include "engine/picture/paths.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <hwy/targets.h>
 
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 
 #include "engine/picture/path_kernel.hpp"
 #include "engine/space/overlap.hpp"
@@ -53,7 +54,8 @@ TEST(Paths, ChordOfASmoothEllipsoidIsAnalytic) {
     for (std::int64_t row = 0; row < 301; ++row) {
       for (std::int64_t column = 0; column < 301; ++column) {
         const double u = (view.frame.x_um(column) - 0.3) / a_um, v = (view.frame.y_um(row) + 0.2) / b_um;
-        const double half_um = c_um * std::sqrt(std::max(0.0, 1.0 - u * u - v * v));   // the chord is 2 c sqrt(1 - (x/a)^2 - (y/b)^2)
+        const double half_um =
+            c_um * std::sqrt(std::max(0.0, 1.0 - u * u - v * v));  // the chord is 2 c sqrt(1 - (x/a)^2 - (y/b)^2)
         const double truth_um = std::max(0.0, height_um + half_um) - std::max(0.0, height_um - half_um);
         const double measured_um = static_cast<double>(view.cell_um[view.index(row, column)]);
         worst_um = std::max(worst_um, std::abs(measured_um - truth_um));
@@ -62,7 +64,7 @@ TEST(Paths, ChordOfASmoothEllipsoidIsAnalytic) {
         }
       }
     }
-    EXPECT_LT(worst_um, 0.07 * c_um) << height_um;   // the rim: a chord shorter than a level
+    EXPECT_LT(worst_um, 0.07 * c_um) << height_um;  // the rim: a chord shorter than a level
   }
 }
 
@@ -83,7 +85,8 @@ TEST(Paths, TwoEqualParallelEllipsoidsLoseHalfTheLensEach) {
   // Scaled to balls of radius 1 at distance x, the lens is (4 + x) (2 - x)^2 / 16 of a ball.
   const Vec3 semiaxes_um(8.0, 6.0, 4.0);
   for (const double x : {0.6, 1.0, 1.5}) {
-    std::vector<Cell> cells = {cell_at(-0.5 * x * semiaxes_um.x(), 0.0, semiaxes_um), cell_at(0.5 * x * semiaxes_um.x(), 0.0, semiaxes_um)};
+    std::vector<Cell> cells = {cell_at(-0.5 * x * semiaxes_um.x(), 0.0, semiaxes_um),
+                               cell_at(0.5 * x * semiaxes_um.x(), 0.0, semiaxes_um)};
     for (Cell& cell : cells) cell.centre_um.z() = 10.0;
     const Colony colony = found(paper_without_noise(), cells);
     const double whole_um3 = testing::ellipsoid_volume_um3(semiaxes_um);
@@ -125,7 +128,7 @@ TEST(Paths, LengthsAreThoseOfTheDefinition) {
       }
     }
     EXPECT_LT(difference_um, 0.006 * sum_um);
-    EXPECT_LT(worst_um, 0.35);   // a ray along a membrane can lose a fold of one level
+    EXPECT_LT(worst_um, 0.35);  // a ray along a membrane can lose a fold of one level
   }
 }
 
@@ -146,11 +149,12 @@ TEST(Paths, FacesAreSharedWithoutGapUnderMax) {
         union_um += any ? step_um : 0.0;
       }
       sum_um += static_cast<double>(shared.cell_um[shared.index(row, column)]);
-      voids_um += static_cast<double>(shared.cell_um[shared.index(row, column)] - with_voids.cell_um[with_voids.index(row, column)]);
+      voids_um += static_cast<double>(shared.cell_um[shared.index(row, column)] -
+                                      with_voids.cell_um[with_voids.index(row, column)]);
     }
   }
   EXPECT_NEAR(sum_um, union_um, 0.001 * union_um);
-  EXPECT_GT(voids_um, 0.005 * union_um);   // `sum` leaves voids in this crowd: the two rules are not the same thing
+  EXPECT_GT(voids_um, 0.005 * union_um);  // `sum` leaves voids in this crowd: the two rules are not the same thing
   for (std::size_t i = 0; i < shared.cell_um.size(); ++i) ASSERT_GE(shared.cell_um[i] - with_voids.cell_um[i], -1e-4F);
 }
 
@@ -165,7 +169,8 @@ TEST(Paths, VolumesAreThoseOfSobolPoints) {
         if (other.id != cell.id) others.push_back(&colony.body(other.id));
       }
       const MassEstimate mass = deformed_mass(colony.body(cell.id), others, rule, points);
-      EXPECT_NEAR(volumes_um3[cell.id.value - 1], mass.volume_um3, 0.004 * colony.body(cell.id).box().volume()) << cell.id.value;
+      EXPECT_NEAR(volumes_um3[cell.id.value - 1], mass.volume_um3, 0.004 * colony.body(cell.id).box().volume())
+          << cell.id.value;
     }
   }
 }
@@ -185,7 +190,8 @@ TEST(Paths, StripsAndThreadsCannotMatter) {
   for (const std::int64_t rows : {1, 16, 37}) {
     std::vector<float> cell_um, nucleus_um;
     for (std::int64_t row = 0; row < frame.height_px; row += rows) {
-      const PathView strip = path_lengths(colony, ContactRule::kSum, frame, {row, std::min(row + rows, frame.height_px)});
+      const PathView strip =
+          path_lengths(colony, ContactRule::kSum, frame, {row, std::min(row + rows, frame.height_px)});
       cell_um.insert(cell_um.end(), strip.cell_um.begin(), strip.cell_um.end());
       nucleus_um.insert(nucleus_um.end(), strip.nucleus_um.begin(), strip.nucleus_um.end());
     }

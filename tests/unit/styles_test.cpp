@@ -1,4 +1,6 @@
 // Brightfield, phase and labels as pictures; colony outlines apart from cell outlines; strips, threads, large pictures.
+#include "engine/picture/styles.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -11,7 +13,6 @@
 #include "engine/picture/optics.hpp"
 #include "engine/picture/pixels.hpp"
 #include "engine/picture/render.hpp"
-#include "engine/picture/styles.hpp"
 #include "engine/picture/top_view.hpp"
 #include "tests/support/bodies.hpp"
 #include "tests/support/founding.hpp"
@@ -58,7 +59,9 @@ TEST(Brightfield, AbsorbsAlongThePathThroughCytoplasmAndNucleus) {
   const double chord_um = 2.0 * std::sqrt(64.0 - 9.0);
   for (int colour = 0; colour < 3; ++colour) {
     const auto i = static_cast<std::size_t>(colour);
-    const auto value = [&](Rgb rgb) { return static_cast<double>(colour == 0 ? rgb.red : colour == 1 ? rgb.green : rgb.blue); };
+    const auto value = [&](Rgb rgb) {
+      return static_cast<double>(colour == 0 ? rgb.red : colour == 1 ? rgb.green : rgb.blue);
+    };
     const double c = kCytoplasmAbsorption_per_um[i], n = kNucleusAbsorption_per_um[i];
     EXPECT_NEAR(value(at(3.0, 0.0)), 255.0 * std::exp(-c * chord_um), 0.6);
     EXPECT_NEAR(value(at(-3.0, 0.0)), 255.0 * std::exp(-c * (chord_um - 6.0) - n * 6.0), 0.6);
@@ -70,7 +73,8 @@ TEST(Brightfield, CellsOverEachOtherAbsorbTogether) {
   Cell low = cell_at(0.0, 0.0, Vec3(6.0, 6.0, 3.0)), high = low;
   low.centre_um.z() = 4.0;
   high.centre_um.z() = 12.0;
-  for (Cell* cell : {&low, &high}) cell->nucleus_radius_um = 0.1, cell->nucleus_um = cell->centre_um + Vec3(5.0, 0.0, 0.0);
+  for (Cell* cell : {&low, &high})
+    cell->nucleus_radius_um = 0.1, cell->nucleus_um = cell->centre_um + Vec3(5.0, 0.0, 0.0);
   const Params params = paper_without_noise();
   const Picture one = *render(found(params, {low}), params, plain(PictureStyle::kBrightfield, 0.1));
   const Picture two = *render(found(params, {low, high}), params, plain(PictureStyle::kBrightfield, 0.1));
@@ -84,7 +88,7 @@ TEST(Phase, CellsAreDarkInABrightHalo) {
   const Picture picture = *render(found(params, cells), params, plain(PictureStyle::kPhase, 0.2));
   const At at{picture};
   const int background = at(60.0, 0.0).red;
-  EXPECT_EQ(background, 128);                     // kPhaseGrey, beyond the kernel's reach
+  EXPECT_EQ(background, 128);  // kPhaseGrey, beyond the kernel's reach
   EXPECT_LT(at(5.0, 0.0).red, background - 30);
   EXPECT_GT(at(11.5, 0.0).red, background + 15);  // just outside the cell
   EXPECT_LT(at(0.0, 0.0).red, at(6.0, 0.0).red);  // the nucleus delays more
@@ -108,7 +112,8 @@ TEST(Phase, HaloIsTheBlurOfThePhase) {
       double sum = 0.0, weights = 0.0;
       for (std::int64_t dy = -24; dy <= 24; ++dy) {
         for (std::int64_t dx = -24; dx <= 24; ++dx) {
-          const double weight = std::exp(-0.5 * 0.25 * static_cast<double>(dx * dx + dy * dy) / (kHaloSigma_um * kHaloSigma_um));
+          const double weight =
+              std::exp(-0.5 * 0.25 * static_cast<double>(dx * dx + dy * dy) / (kHaloSigma_um * kHaloSigma_um));
           sum += weight * phase(row + dy, column + dx);
           weights += weight;
         }
@@ -135,12 +140,12 @@ TEST(Labels, ColoursAreIdsAndBack) {
   const Params params = paper();
   const Colony colony = found(params, scattered_cells(20, 40.0, 3));
   PictureSpec spec = plain(PictureStyle::kLabels, 0.2);
-  spec.scale_bar = true;   // no bar: it would be a cell
+  spec.scale_bar = true;  // no bar: it would be a cell
   const Picture picture = *render(colony, params, spec);
   const TopView view = top_view(colony, *frame_of(colony, spec));
   for (std::size_t i = 0; i < view.owner.size(); ++i) {
-    const std::uint32_t rgb = static_cast<std::uint32_t>(picture.rgb[3 * i]) << 16 | static_cast<std::uint32_t>(picture.rgb[3 * i + 1]) << 8 |
-                              picture.rgb[3 * i + 2];
+    const std::uint32_t rgb = static_cast<std::uint32_t>(picture.rgb[3 * i]) << 16 |
+                              static_cast<std::uint32_t>(picture.rgb[3 * i + 1]) << 8 | picture.rgb[3 * i + 2];
     ASSERT_EQ(label_of_colour(rgb).value, view.owner[i]);
   }
 }
@@ -175,7 +180,7 @@ TEST(Labels, AreasAreThoseOfSobolPoints) {
   }
   const double share_um2 = width_um * height_um / static_cast<double>(points.size());
   for (std::size_t id = 1; id < areas_um2.size(); ++id) {
-    if (areas_um2[id] < 20.0) continue;   // a few hits say nothing
+    if (areas_um2[id] < 20.0) continue;  // a few hits say nothing
     EXPECT_NEAR(areas_um2[id], hits[id] * share_um2, scaled(0.02, 0.01) * areas_um2[id] + 0.5 * share_um2) << id;
   }
 }
@@ -188,14 +193,16 @@ TEST(Contours, OutlineAndWallsAreApart) {
     spec.contour_lines = lines;
     return *render(colony, params, spec);
   };
-  const Picture both = drawn(ContourLines::kBoth), outline = drawn(ContourLines::kColony), walls = drawn(ContourLines::kCells);
+  const Picture both = drawn(ContourLines::kBoth), outline = drawn(ContourLines::kColony),
+                walls = drawn(ContourLines::kCells);
   const TopView view = top_view(colony, *frame_of(colony, spec));
   std::size_t outline_count = 0, wall_count = 0;
   for (std::int64_t row = 1; row + 1 < view.frame.height_px; ++row) {
     for (std::int64_t column = 1; column + 1 < view.frame.width_px; ++column) {
       const auto at = [&](std::int64_t r, std::int64_t c) { return view.owner[view.index(r, c)]; };
       const std::uint32_t owner = at(row, column);
-      const std::uint32_t around[4] = {at(row - 1, column), at(row + 1, column), at(row, column - 1), at(row, column + 1)};
+      const std::uint32_t around[4] = {at(row - 1, column), at(row + 1, column), at(row, column - 1),
+                                       at(row, column + 1)};
       const bool rim = owner != 0 && std::any_of(around, around + 4, [](std::uint32_t o) { return o == 0; });
       const bool wall = std::any_of(around, around + 4, [&](std::uint32_t o) { return o != 0 && o < owner; });
       const std::size_t i = 3 * view.index(row, column);
@@ -210,8 +217,8 @@ TEST(Contours, OutlineAndWallsAreApart) {
   EXPECT_GT(wall_count, 300u);
 }
 
-constexpr PictureStyle kStyles[] = {PictureStyle::kShaded, PictureStyle::kContours, PictureStyle::kBrightfield, PictureStyle::kPhase,
-                                    PictureStyle::kLabels};
+constexpr PictureStyle kStyles[] = {PictureStyle::kShaded, PictureStyle::kContours, PictureStyle::kBrightfield,
+                                    PictureStyle::kPhase, PictureStyle::kLabels};
 
 TEST(Strips, ThreadsCannotMatterInAnyStyle) {
   const Params params = paper();
@@ -220,7 +227,7 @@ TEST(Strips, ThreadsCannotMatterInAnyStyle) {
     PictureSpec spec = plain(style, 0.1);
     spec.scale_bar = true;
     const Picture one = *render(colony, params, spec);
-    ASSERT_GT(one.height_px, 256);   // more than one strip
+    ASSERT_GT(one.height_px, 256);  // more than one strip
     for (const int threads : {2, 7}) EXPECT_EQ(render(colony, params, spec, Effort{threads, nullptr})->rgb, one.rgb);
   }
 }
@@ -234,7 +241,8 @@ TEST(Strips, PngByStripsDecodesToTheSamePixels) {
     const Picture picture = *render(colony, params, spec);
     std::string bytes;
     std::size_t pieces = 0;
-    ASSERT_TRUE(render_png(colony, params, spec, Effort{2, nullptr}, [&](std::string_view piece) { bytes += piece, ++pieces; }));
+    ASSERT_TRUE(render_png(colony, params, spec, Effort{2, nullptr},
+                           [&](std::string_view piece) { bytes += piece, ++pieces; }));
     EXPECT_GT(pieces, 2u);
     const std::unique_ptr<spng_ctx, void (*)(spng_ctx*)> context(spng_ctx_new(0), spng_ctx_free);
     ASSERT_EQ(spng_set_png_buffer(context.get(), bytes.data(), bytes.size()), 0);
