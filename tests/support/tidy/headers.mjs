@@ -6,7 +6,7 @@ import { cpus } from 'node:os';
 import { dirname, join } from 'node:path';
 import { includes } from './text.mjs';
 
-const flags = ['-std=c++20', '-fsyntax-only', '-Wall', '-Wextra', '-Werror', '-x', 'c++', '-I.', '-isystem', '/usr/include/eigen3', '-'];
+const flags = ['-std=c++20', '-fsyntax-only', '-Wall', '-Wextra', '-Werror', '-x', 'c++', '-I.', '-isystem', '/usr/include/eigen3', '-isystem', '/usr/include/opencv4', '-'];
 
 function compile(top, header) {
   return new Promise((resolve, reject) => {
