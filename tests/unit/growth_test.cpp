@@ -35,7 +35,7 @@ TEST(SplittingPlane, AngleErrorAgainstTheShortAxisFallsWithElongation) {
       g.centre_um = Vec3(3.0, -2.0, spread_height_um(g.semiaxes_um));
       const Body body(g, testing::smooth());
       const Vec3 c = centroid_above_dish_um(g);
-      const auto m = nearest_membrane_um(body, {}, ContactRule::kSum, c, testing::points(kMembranePoints, k));
+      const auto m = nearest_membrane_um(body, {}, ContactRule::kSum, c, testing::points(kSettlePoints, k));
       ASSERT_TRUE(m);
       ASSERT_FALSE(body.contains(*m));
       ASSERT_GE(m->z(), 0.0);
@@ -99,28 +99,29 @@ RC_GTEST_PROP(GrayCode, RoundTripsAndNeighboursDifferInOneBit, (std::uint16_t ra
 TEST(Chromosome, GenesCoverTheirIntervalAndCodesRoundTrip) {
   for (const Coding coding : {Coding::kGray, Coding::kBinary}) {
     for (int bits = 4; bits <= 16; ++bits) {
-      Chromosome chromosome(bits);
-      for (int gene = 0; gene < kGeneCount; ++gene) {
+      Chromosome chromosome(kGeneCountMulti, bits);
+      for (int gene = 0; gene < kGeneCountMulti; ++gene) {
         for (const double value : {0.0, 0.25, 0.5, 1.0}) {
           chromosome.set_code(gene, code_of(value, bits, coding));
           EXPECT_NEAR(chromosome.value(gene, coding), value, 0.5001 / ((1 << bits) - 1));
         }
       }
-      EXPECT_EQ(chromosome.length(), 17 * bits);
+      EXPECT_EQ(chromosome.length(), 19 * bits);
+      EXPECT_EQ(Chromosome(kGeneCountMono, bits).length(), 17 * bits);
     }
   }
 }
 
 TEST(Chromosome, FlipChangesOneBitCountedFromTheMostSignificantOfTheFirstGene) {
   for (const int bits : {4, 8, 16}) {
-    for (int bit = 0; bit < kGeneCount * bits; ++bit) {
-      Chromosome chromosome(bits);
+    for (int bit = 0; bit < kGeneCountMulti * bits; ++bit) {
+      Chromosome chromosome(kGeneCountMulti, bits);
       chromosome.flip(bit);
-      for (int gene = 0; gene < kGeneCount; ++gene) {
+      for (int gene = 0; gene < kGeneCountMulti; ++gene) {
         EXPECT_EQ(chromosome.code(gene), gene == bit / bits ? 1U << (bits - 1 - bit % bits) : 0U);
       }
       chromosome.flip(bit);
-      EXPECT_EQ(chromosome, Chromosome(bits));
+      EXPECT_EQ(chromosome, Chromosome(kGeneCountMulti, bits));
     }
   }
 }
@@ -128,7 +129,7 @@ TEST(Chromosome, FlipChangesOneBitCountedFromTheMostSignificantOfTheFirstGene) {
 TEST(Chromosome, CrossoverTakesTheHeadOfOneAndTheTailOfTheOther) {
   Stream stream = testing::case_stream(1);
   for (const int bits : {4, 7, 8, 16}) {
-    const Chromosome a = random_chromosome(bits, stream), b = random_chromosome(bits, stream);
+    const Chromosome a = random_chromosome(kGeneCountMulti, bits, stream), b = random_chromosome(kGeneCountMulti, bits, stream);
     const auto bit_of = [&](const Chromosome& c, int bit) {
       return (c.code(bit / bits) >> (bits - 1 - bit % bits)) & 1U;
     };
@@ -176,8 +177,8 @@ RC_GTEST_PROP(Decode, EveryStringIsAPairInsideAllRangesAndInsideTheSearchReach, 
   for (const FieldError& error : validate(p)) RC_ASSERT(error.pointer == "/cell/nucleus_radius_um");  // of no meaning here
   const double reach = search_reach_um(p), extent = body_half_extent_max_um(p);
   for (int i = 0; i < 20; ++i) {
-    Chromosome chromosome = random_chromosome(static_cast<int>(p.search.bits), stream);
-    for (int gene = 0; gene < kGeneCount; ++gene) {  // many genes at an end of their range
+    Chromosome chromosome = random_chromosome(kGeneCountMono, static_cast<int>(p.search.bits), stream);
+    for (int gene = 0; gene < kGeneCountMono; ++gene) {  // many genes at an end of their range
       const std::uint32_t which = stream.below(4);
       if (which < 2) chromosome.set_code(gene, code_of(which, chromosome.bits(), p.search.coding));
     }
@@ -226,7 +227,7 @@ TEST(Decode, TheUnturnedCandidateStandsAcrossTheGivenPlane) {
   for (const Coding coding : {Coding::kGray, Coding::kBinary}) {
     p.search.coding = coding;
     Stream stream = testing::case_stream(5);
-    Chromosome chromosome = random_chromosome(8, stream);
+    Chromosome chromosome = random_chromosome(kGeneCountMono, 8, stream);
     chromosome.set_code(kTurn, code_of(0.5, 8, coding));
     PairFrame frame;
     frame.direction = Vec3(0.6, 0.8, 0.0);

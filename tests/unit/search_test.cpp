@@ -78,6 +78,7 @@ TEST(Search, EveryOptimiserCodingAndSelectionHasTheSameBudgetOfEvaluations) {
   const SearchTask task = task_for(colony, CellId{1});
   Params params;
   params.contact.fitness_good = 1.0;  // not to be reached in the middle of a crowd: no early end
+  params.search.give_up_margin = std::nullopt;
   params.search.points = 64;
   for (const Optimiser optimiser : {Optimiser::kGenetic, Optimiser::kRandom, Optimiser::kSobol}) {
     for (const Coding coding : {Coding::kGray, Coding::kBinary}) {
@@ -112,6 +113,7 @@ TEST(Search, SmallestAndLargestSettingsRun) {
   params.search.corrector_generations = 0;
   params.search.bits = 4;
   params.contact.fitness_good = 1.0;
+  params.search.give_up_margin = std::nullopt;
   EXPECT_EQ(find_space(colony, params, task_for(colony, CellId{1})).evaluation_count, 4U);
   params.search.bits = 16;
   params.search.mutation_rate = 0.5;
@@ -128,6 +130,7 @@ TEST(Search, GeneticSearchFindsBetterPlacesThanRandomAndSobolWithTheSameEvaluati
   for (std::uint32_t k = 1; k <= searches; ++k) {
     Params params;
     params.contact.fitness_good = 1.0;
+    params.search.give_up_margin = std::nullopt;
     const SearchTask task = task_for(colony, CellId{1 + k % 60}, k);
     const double g = find_space(colony, params, task).fitness;
     params.search.optimiser = Optimiser::kRandom;
