@@ -187,9 +187,10 @@ TEST(Search, NeighboursKeepTheShareThatIsAsked) {
   Params params;
   params.contact.neighbour_retained_min = 0.9;
   params.search.points = 256;
+  params.search.give_up_margin = std::nullopt;
   int asked = 0, refused = 0;
-  for (std::uint32_t k = 1; k <= 12; ++k) {
-    const SearchTask task = task_for(colony, CellId{k * 5});
+  for (std::uint32_t k = 1; k <= 60; ++k) {
+    const SearchTask task = task_for(colony, CellId{k});
     const SearchResult found = find_space(colony, params, task);
     if (!(found.fitness > 0.0)) {
       ++refused;
@@ -209,7 +210,8 @@ TEST(Search, NeighboursKeepTheShareThatIsAsked) {
       EXPECT_GE(after, std::min(0.9, before) - 0.02) << "search " << k << " neighbour " << cell.id.value;
     }
   }
-  EXPECT_GT(asked, 0);
+  std::printf("retained share: %d of 60 searches refused, %d neighbours looked at\n", refused, asked);
+  EXPECT_GT(asked, 10);
   EXPECT_GT(refused, 0);
 }
 
