@@ -9,6 +9,7 @@
 
 #include "engine/growth/chromosome.hpp"
 #include "engine/growth/splitting.hpp"
+#include "tests/support/any_params.hpp"
 #include "tests/support/bodies.hpp"
 #include "tests/support/scale.hpp"
 #include "tests/support/stats.hpp"
@@ -141,31 +142,6 @@ TEST(Chromosome, CrossoverTakesTheHeadOfOneAndTheTailOfTheOther) {
   }
 }
 
-// Parameters within the ranges of validation, extremes among them.
-Params any_params(Stream& stream) {
-  const auto pick = [&](double low, double high) {
-    const std::uint32_t which = stream.below(4);
-    return which == 0 ? low : which == 1 ? high : stream.uniform({low, high});
-  };
-  const auto interval = [&](double low, double high) {
-    const double a = pick(low, high), b = pick(low, high);
-    return Interval{std::min(a, b), std::max(a, b)};
-  };
-  Params p;
-  p.cell.pair_volume_um3 = interval(50, 100'000);
-  p.cell.smaller_share = interval(0.2, 0.5);
-  p.cell.elongation = interval(1, 3);
-  p.cell.flatness = interval(0.2, 1);
-  p.noise = {pick(0, 0.40), pick(2, 8), pick(0, 6.28)};
-  p.search.coding = stream.below(2) == 0 ? Coding::kGray : Coding::kBinary;
-  p.search.bits = 4 + stream.below(13);
-  p.search.turn_max_deg = pick(0, 90);
-  p.search.distance = interval(0.3, 1.5);
-  p.search.sideways = pick(0, 0.5);
-  p.search.tilt_max_deg = pick(0, 20);
-  return p;
-}
-
 bool within(const Interval& range, double value) {
   const double slack = 1e-9 * std::max(1.0, std::abs(range.high));
   return value >= range.low - slack && value <= range.high + slack;
@@ -173,15 +149,11 @@ bool within(const Interval& range, double value) {
 
 RC_GTEST_PROP(Decode, EveryStringIsAPairInsideAllRangesAndInsideTheSearchReach, (std::uint32_t number)) {
   Stream stream = testing::case_stream(number);
-  const Params p = any_params(stream);
+  const Params p = testing::any_params(stream);
   for (const FieldError& error : validate(p)) RC_ASSERT(error.pointer == "/cell/nucleus_radius_um");  // of no meaning here
   const double reach = search_reach_um(p), extent = body_half_extent_max_um(p);
   for (int i = 0; i < 20; ++i) {
-    Chromosome chromosome = random_chromosome(kGeneCountMono, static_cast<int>(p.search.bits), stream);
-    for (int gene = 0; gene < kGeneCountMono; ++gene) {  // many genes at an end of their range
-      const std::uint32_t which = stream.below(4);
-      if (which < 2) chromosome.set_code(gene, code_of(which, chromosome.bits(), p.search.coding));
-    }
+    const Chromosome chromosome = testing::any_chromosome(p, stream);
     PairFrame frame;
     frame.pivot_um = Vec3(stream.uniform({-100, 100}), stream.uniform({-100, 100}), 3.0);
     const double angle = stream.uniform({0, 6.28});
