@@ -57,7 +57,7 @@ class Scorer {
     scene.voxels_x = static_cast<float>(ws_.voxels.nx());
     scene.empty_cube = static_cast<float>(ws_.voxels.empty_cube());
     scene.voxels_per_um = static_cast<float>(1.0 / ws_.voxels.edge_um());
-    const Vec3 shift = (c - ws_.voxels.corner_um()) / ws_.voxels.edge_um() - Vec3::Constant(0.5);
+    const Vec3 shift = (c - ws_.voxels.corner_um()) / ws_.voxels.edge_um() - Vec3(0.5, 0.5, 0.5 - kVoxelLift);
     for (int i = 0; i < 3; ++i) scene.voxel_shift[i] = static_cast<float>(shift[i]);
     scene.dish_z = static_cast<float>(-c.z());
     scene.has_wall = false;
@@ -245,7 +245,7 @@ class Search {
       if (candidates[i].fitness > candidates[best].fitness) best = i;
     }
     best_ = candidates[best];
-    scorer_.race_to(best_.fitness);
+    if (task_.racing) scorer_.race_to(best_.fitness);
   }
 
   void predict() {

@@ -25,6 +25,7 @@ struct SearchTask {
   CellId cell_id;               // the dividing cell: not a neighbour of its own daughters
   std::uint32_t ordinal = 0;
   PairFrame frame;
+  bool racing = true;           // false: every candidate is scored on all points, for tests of what giving candidates up costs
 };
 
 struct SearchResult {

@@ -153,9 +153,9 @@ void add_rows_kernel(const RowRange& rows, std::int32_t first_x, std::int32_t n,
         }
         if (x + 32 > n) bits = x < n ? bits & ((1U << (n - x)) - 1U) : 0;
         if (bits == 0) continue;
-        const std::uint64_t padded = bits;  // LoadMaskBits may read 8 bytes
         for (std::size_t i = 0; i < 32; i += lanes) {
-          const auto mask = hn::LoadMaskBits(bytes, reinterpret_cast<const std::uint8_t*>(&padded) + i / 8);
+          const std::uint64_t part = bits >> i;  // LoadMaskBits may read 8 bytes; lanes may be fewer than a byte's bits
+          const auto mask = hn::LoadMaskBits(bytes, reinterpret_cast<const std::uint8_t*>(&part));
           const auto before = hn::LoadU(bytes, row + x + i);
           hn::StoreU(hn::SaturatedAdd(before, hn::IfThenElseZero(mask, one)), bytes, row + x + i);
         }

@@ -81,6 +81,10 @@ class VoxelCounts {
   std::vector<std::uint8_t> counts_;
 };
 
+/// In edges: how much higher a point is looked up than it lies. A point on the dish must not fall below the lowest cubes by rounding: it
+/// would be looked up outside the counts. The layer on top leaves room for it.
+inline constexpr double kVoxelLift = 1e-4;
+
 /// Edge of the cubes.
 double voxel_edge_um(const Params& params);
 
