@@ -68,7 +68,7 @@ PairScore score_pair_reference(const SearchScene& scene, const std::array<Candid
       const auto cube = [&](float p, int axis) {
         return ((p * scene.voxels_per_um + scene.voxel_shift[axis]) + 12582912.0F) - 12582912.0F;
       };
-      score.shared[k] += scene.counts[static_cast<std::size_t>((std::max(0.0F, cube(z, 2)) * scene.voxels_x + cube(y, 1)) * scene.voxels_x + cube(x, 0))];
+      score.shared[k] += scene.counts[static_cast<std::size_t>((cube(z, 2) * scene.voxels_x + cube(y, 1)) * scene.voxels_x + cube(x, 0))];
     }
   }
   return score;

@@ -61,8 +61,7 @@ HWY_INLINE Tally tally(const SearchScene& scene, const CandidateBody& body, cons
     }
     const V cube_x = cube_of(hn::Add(hn::Mul(x, scale), constant(scene.voxel_shift[0])));
     const V cube_y = cube_of(hn::Add(hn::Mul(y, scale), constant(scene.voxel_shift[1])));
-    // A point on the dish may round to below it; along x and y the box of cubes has room to spare.
-    const V cube_z = hn::Max(hn::Zero(d), cube_of(hn::Add(hn::Mul(z, scale), constant(scene.voxel_shift[2]))));
+    const V cube_z = cube_of(hn::Add(hn::Mul(z, scale), constant(scene.voxel_shift[2])));
     // Exact: all whole numbers below 2^23.
     const V cube = hn::Add(hn::Mul(hn::Add(hn::Mul(cube_z, nx), cube_y), nx), cube_x);
     covering += look_up(scene.counts, hn::IfThenElse(above, cube, constant(scene.empty_cube)));

@@ -48,7 +48,7 @@ struct SearchStage {
   }
 
   void add(const Body& body) {
-    Raster raster;
+    VoxelRaster raster;
     make_raster(body, voxels.edge_um(), raster);
     voxels.add(raster);
   }

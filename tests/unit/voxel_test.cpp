@@ -21,12 +21,12 @@
 namespace colony {
 namespace {
 
-bool equal(const Raster& a, const Raster& b) {
+bool equal(const VoxelRaster& a, const VoxelRaster& b) {
   return a.x0 == b.x0 && a.y0 == b.y0 && a.z0 == b.z0 && a.nx == b.nx && a.ny == b.ny && a.nz == b.nz && a.words_per_row == b.words_per_row &&
          a.rows == b.rows;
 }
 
-TEST(Raster, EqualsItsTwinOnEveryTarget) {
+TEST(VoxelRaster, EqualsItsTwinOnEveryTarget) {
   int wide = 0;
   for (std::uint32_t number = 1; number <= testing::scaled(150U, 2000U); ++number) {
     Stream stream = testing::case_stream(number);
@@ -34,7 +34,7 @@ TEST(Raster, EqualsItsTwinOnEveryTarget) {
     BodyGeometry g = number % 2 == 0 ? testing::spread_cell(stream, 0.0, 0.0, 3000.0) : testing::any_ellipsoid(stream, 40.0);
     const Body body(g, noise);
     const double edge_um = stream.uniform({0.35, 2.0});
-    Raster expected, found;
+    VoxelRaster expected, found;
     make_raster_reference(body, edge_um, expected);
     wide += expected.words_per_row > 1 ? 1 : 0;
     testing::on_every_target([&](const std::string& name) {
@@ -53,11 +53,11 @@ std::array<std::int32_t, 2> corner_of(const VoxelCounts& voxels) {
   return {static_cast<std::int32_t>(std::lround(corner.x())), static_cast<std::int32_t>(std::lround(corner.y()))};
 }
 
-void expect_brute_force(const VoxelCounts& voxels, const std::vector<Raster>& rasters, const char* name, std::uint64_t& covered) {
+void expect_brute_force(const VoxelCounts& voxels, const std::vector<VoxelRaster>& rasters, const char* name, std::uint64_t& covered) {
   const auto [x0, y0] = corner_of(voxels);
   std::vector<std::uint8_t> expected(voxels.empty_cube() + 1, 0);
   const std::int32_t n = voxels.nx();
-  for (const Raster& raster : rasters) {
+  for (const VoxelRaster& raster : rasters) {
     for (std::int32_t z = raster.z0; z < raster.z0 + raster.nz; ++z) {
       for (std::int32_t y = raster.y0; y < raster.y0 + raster.ny; ++y) {
         for (std::int32_t x = raster.x0; x < raster.x0 + raster.nx; ++x) {
@@ -87,7 +87,7 @@ TEST(VoxelCounts, EqualBruteForceAlsoWhereBodiesReachBeyondTheBox) {
     voxels.centre_on(pivot);
     const double half_um = 0.5 * voxels.nx() * voxels.edge_um();
     const auto [x0, y0] = corner_of(voxels);
-    std::vector<Raster> rasters;
+    std::vector<VoxelRaster> rasters;
     for (int i = 0; i < 30; ++i) {
       const Pair pair = decode(testing::any_chromosome(params, stream), testing::any_frame(params, stream), params);
       BodyGeometry g = pair.bodies[stream.below(2)];
@@ -95,7 +95,7 @@ TEST(VoxelCounts, EqualBruteForceAlsoWhereBodiesReachBeyondTheBox) {
       const double x = stream.uniform({-1.3, 1.3}), y = stream.uniform({-1.3, 1.3});
       g.centre_um = Vec3(pivot.x() + half_um * x, pivot.y() + half_um * y, g.centre_um.z());
       if (i % 5 == 0) g.centre_um[i % 2] = pivot[i % 2] + (i % 3 == 0 ? -half_um : half_um);
-      Raster& raster = rasters.emplace_back();
+      VoxelRaster& raster = rasters.emplace_back();
       make_raster(Body(g, params.noise), voxels.edge_um(), raster);
       wide += raster.words_per_row > 1 ? 1 : 0;
       clipped[0] += raster.x0 < x0 && raster.x0 + raster.nx > x0 ? 1 : 0;
@@ -108,7 +108,7 @@ TEST(VoxelCounts, EqualBruteForceAlsoWhereBodiesReachBeyondTheBox) {
       voxels.centre_on(Vec3(0, 0, 1));
       voxels.add(rasters.front());  // nothing may be left of an earlier search
       voxels.centre_on(pivot);
-      for (const Raster& raster : rasters) voxels.add(raster);
+      for (const VoxelRaster& raster : rasters) voxels.add(raster);
       expect_brute_force(voxels, rasters, name.c_str(), covered);
     }, number == 1);
     if (HasFatalFailure()) FAIL() << "case " << number;
@@ -125,13 +125,13 @@ TEST(VoxelCounts, StayAt255) {
   VoxelCounts voxels(params);
   voxels.centre_on(Vec3(0, 0, 2));
   Stream stream = testing::case_stream(1);
-  Raster raster;
+  VoxelRaster raster;
   make_raster(Body(testing::spread_cell(stream, 0, 0, 0), testing::rough()), voxels.edge_um(), raster);
   std::uint64_t covered = 0;
   testing::on_every_target([&](const std::string& name) {
     voxels.centre_on(Vec3(0, 0, 2));
     for (int i = 0; i < 300; ++i) voxels.add(raster);
-    expect_brute_force(voxels, std::vector<Raster>(300, raster), name.c_str(), covered);
+    expect_brute_force(voxels, std::vector<VoxelRaster>(300, raster), name.c_str(), covered);
   });
   EXPECT_EQ(*std::max_element(voxels.counts(), voxels.counts() + voxels.empty_cube()), 255);
 }
@@ -140,7 +140,7 @@ TEST(VoxelCounts, ABodyHigherThanAnyOfTheModelFailsACheck) {
   const Params params;
   VoxelCounts voxels(params);
   voxels.centre_on(Vec3(0, 0, 2));
-  Raster raster;
+  VoxelRaster raster;
   make_raster(Body(testing::sphere(5.0, Vec3(0, 0, 40)), testing::smooth()), voxels.edge_um(), raster);
   EXPECT_THROW(voxels.add(raster), CheckFailure);
 }
@@ -165,7 +165,7 @@ TEST(RasterCache, NeverServesABodyThatHasMovedOrDivided) {
     if (what == 3) geometry.centre_um.y() += 0.5 * edge_um;
     if (what == 4) geometry.noise_offset[static_cast<int>(stream.below(3))] += 0.5;
     const Body body(geometry, testing::rough());
-    Raster expected;
+    VoxelRaster expected;
     make_raster(body, edge_um, expected);
     std::uint64_t field_count = 0;
     ASSERT_TRUE(equal(cache.of(id, body, field_count), expected)) << "step " << step;
