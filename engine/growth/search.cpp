@@ -126,8 +126,27 @@ class Scorer {
 
   /// On the fresh points, by the definition.
   double score_finally(const Pair& pair, bool& crosses_wall) {
-    tiled_sobol(static_cast<std::uint32_t>(params_.search.points_final), seeds_for(task_, Purpose::kFinalPoints, 0), ws_.final_points);
+    const std::array<std::uint32_t, 3> seeds = seeds_for(task_, Purpose::kFinalPoints, 0);
+    const auto final_count = static_cast<std::uint32_t>(params_.search.points_final);
     const std::array<Body, 2> bodies = {Body(pair.bodies[0], params_.noise), Body(pair.bodies[1], params_.noise)};
+    if (params_.division.inhibition && final_count > kLookPoints) {
+      scrambled_sobol(kLookPoints, seeds, ws_.final_points);
+      const double fitness = fitness_of(bodies, crosses_wall);
+      if (fitness < params_.contact.fitness_min - kLookMargin) return fitness;
+    }
+    tiled_sobol(final_count, seeds, ws_.final_points);
+    const double fitness = fitness_of(bodies, crosses_wall);
+    if (fitness > 0.0 && params_.contact.neighbour_retained_min > 0.0) {
+      // Neighbours are judged on fresh points too.
+      tiled_sobol(static_cast<std::uint32_t>(params_.search.points_final), seeds_for(task_, Purpose::kRetained, 1), ws_.retained_points);
+      if (!neighbours_keep_enough(bodies)) return 0.0;
+    }
+    return fitness;
+  }
+
+ private:
+  // Of a pair, on ws_.final_points.
+  double fitness_of(const std::array<Body, 2>& bodies, bool& crosses_wall) {
     double fitness = 1.0;
     crosses_wall = false;
     for (std::size_t k = 0; k < 2; ++k) {
@@ -141,15 +160,9 @@ class Scorer {
       fitness = std::min(fitness, ws_.counts.fitness());
       crosses_wall = crosses_wall || ws_.counts.outside_wall_count > 0;
     }
-    if (fitness > 0.0 && params_.contact.neighbour_retained_min > 0.0) {
-      // Neighbours are judged on fresh points too.
-      tiled_sobol(static_cast<std::uint32_t>(params_.search.points_final), seeds_for(task_, Purpose::kRetained, 1), ws_.retained_points);
-      if (!neighbours_keep_enough(bodies)) return 0.0;
-    }
     return fitness;
   }
 
- private:
   // About 1.5 ns a point of the search and candidate; asking neighbours what they keep costs far more. Handing work to a thread costs some
   // microseconds: at the defaults (32 candidates of 256 points, 10 us) it would only cost.
   bool is_worth_threads(std::size_t candidate_count) const {

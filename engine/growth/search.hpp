@@ -30,7 +30,7 @@ struct SearchTask {
 
 struct SearchResult {
   Pair pair;                    // the winner
-  double fitness = 0.0;         // on the fresh points
+  double fitness = 0.0;         // on the fresh points (the first kLookPoints of them where the pair fails by far)
   double search_fitness = 0.0;  // on the points of the search
   std::uint32_t evaluation_count = 0;
   bool corrected = false;
