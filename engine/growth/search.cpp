@@ -68,8 +68,11 @@ class Scorer {
       scene.wall_y = static_cast<float>(-c.y());
       scene.wall_radius2 = static_cast<float>(radius * radius);
     }
-    // In the order of the sequence: every prefix is a fair sample.
-    scrambled_sobol(static_cast<std::uint32_t>(params.search.points), seeds_for(task, Purpose::kSearchPoints, 0), ws_.points);
+    // In the order of the sequence: every prefix is a fair sample. The cube about the unit frame is 1.3 to 1.5 times the body's own box
+    // above the dish, which search.points is about: half as many more, so that no fewer fall inside.
+    const auto points = static_cast<std::uint32_t>(params.search.points);
+    scrambled_sobol(std::min(2 * points, kSobolPointsMax), seeds_for(task, Purpose::kSearchPoints, 0), ws_.points);
+    ws_.points.count = std::min(points + points / 2, kSobolPointsMax);
     for (std::size_t k = 0; k < 2; ++k) {
       // Only the noise of this body counts: its place and shape are the candidate's.
       const Body noise_of({Vec3::Zero(), Vec3::Ones(), Vec3::Zero(), task.frame.noise_offsets[k]}, params.noise);
