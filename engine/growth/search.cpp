@@ -16,7 +16,7 @@ namespace colony {
 namespace {
 
 constexpr std::uint32_t kCorrectorLane = 1000;  // past the last generation of a predictor
-constexpr double kDropDeviations = 1.5;         // see race_to()
+constexpr double kDropDeviations = 2.0;         // see race_to()
 
 std::array<std::uint32_t, 3> seeds_for(const SearchTask& task, Purpose purpose, std::uint32_t lane) {
   Stream stream(task.seed, task.cell_id, task.ordinal, purpose, lane);
@@ -88,7 +88,7 @@ class Scorer {
   /// From here on a candidate is given up once it cannot beat `best` any more: after h hits, when more are shared than
   ///     h (1 - best) + kDropDeviations sqrt(h best (1 - best)) + 1/2.
   /// A candidate whose true fitness is `best` shares a binomial number with mean h (1 - best) (Sobol points vary less), so it is given
-  /// up with probability below 7 % at each of the two looks; one that would be better by d is safer by d sqrt(h / best (1 - best)).
+  /// up with probability below 2.3 % at each of the two looks; one that would be better by d is safer by d sqrt(h / best (1 - best)).
   void race_to(double best) {
     const std::size_t n = std::max(ws_.scene.own[0].size(), ws_.scene.own[1].size());
     ws_.most_shared.resize(n + 1);

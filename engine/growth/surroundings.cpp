@@ -90,10 +90,10 @@ std::vector<Woken> wake_sleepers(const Colony& colony, const Params& params, See
   const double radius = params.wake.free_radius_um;
   std::vector<Box> changed;
   if (change.gone) changed.push_back(colony.body(*change.gone).box());
-  if (params.wake.rule == WakeRule::kAlways) {
+  if (params.wake.rule == WakeRule::kAlways || params.wake.gain == 0.0) {
     for (const Body& body : change.bodies) changed.push_back(body.box());
   }
-  // Rule `share`: only what has gone makes room. Where nothing went, the share is at most what it was when last looked at, and then it had
+  // Rule `share` with a gain above 0: only what has gone makes room. Where nothing went, the share is at most what it was when last looked at, and then it had
   // not grown enough; so nobody there is looked at again.
   if (changed.empty()) return {};
 

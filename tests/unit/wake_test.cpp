@@ -59,10 +59,12 @@ void check_woken(const RunSpec& spec, const Colony& before, const Colony& after,
   }
 }
 
+// Every sleeper near any changed body is asked here; the engine skips those near which nothing went, and must wake the same ones.
 TEST(Waking, WakesExactlyTheSleepersNearAChangeThatGainedRoom) {
-  for (const WakeRule rule : {WakeRule::kShare, WakeRule::kAlways}) {
+  for (const auto& [rule, gain] : {std::pair{WakeRule::kShare, 0.02}, {WakeRule::kShare, 0.002}, {WakeRule::kAlways, 0.02}}) {
     RunSpec spec = testing::spec_of(4, testing::scaled(400, 1000));
     spec.params.wake.rule = rule;
+    spec.params.wake.gain = gain;
     const testing::Run run = testing::run(spec);
     Colony before(spec.params), after(spec.params);
     int woken = 0;
@@ -71,7 +73,7 @@ TEST(Waking, WakesExactlyTheSleepersNearAChangeThatGainedRoom) {
       check_woken(spec, before, after, event, woken);
       before.apply(event);
     }
-    std::printf("%s: %d woken\n", rule == WakeRule::kShare ? "share" : "always", woken);
+    std::printf("%s, gain %.3f: %d woken\n", rule == WakeRule::kShare ? "share" : "always", gain, woken);
     EXPECT_GT(woken, rule == WakeRule::kShare ? 3 : 100);
   }
 }
