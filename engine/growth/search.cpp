@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "engine/base/check.hpp"
+#include "engine/growth/support.hpp"
 #include "engine/space/overlap.hpp"
 
 namespace colony {
@@ -93,7 +94,7 @@ class Scorer {
     racing_ = best > 0.0;
   }
 
-  /// On the points of the search. Below the best if it was given up.
+  /// On the points of the search. Below the best if it was given up, 0 if nothing holds it up.
   double score(const Chromosome& chromosome) {
     ws_.genes.decode(chromosome, task_.frame, ws_.candidate);
     const kernel::ShareLimit limit = racing_ ? kernel::ShareLimit(ws_.most_shared) : kernel::ShareLimit();
@@ -105,18 +106,21 @@ class Scorer {
       if (score.hits[k] == 0 && score.dropped) continue;  // not looked at
       fitness = std::min(fitness, share_left(score.hits[k], score.shared[k]));
     }
-    if (score.dropped || !(fitness > 0.0) || !(params_.contact.neighbour_retained_min > 0.0)) return fitness;
+    if (score.dropped || !(fitness > 0.0)) return fitness;
+    if (params_.layers == Layers::kMulti && !is_supported({footing(score, 0), footing(score, 1)})) return 0.0;
+    if (!(params_.contact.neighbour_retained_min > 0.0)) return fitness;
     const Pair pair = decode(chromosome, task_.frame, params_);
     const std::array<Body, 2> bodies = {Body(pair.bodies[0], params_.noise), Body(pair.bodies[1], params_.noise)};
     return neighbours_keep_enough(bodies) ? fitness : 0.0;
   }
 
   /// On the fresh points, by the definition.
-  double score_finally(const Pair& pair, bool& crosses_wall) {
+  double score_finally(const Pair& pair, bool& crosses_wall, bool& supported) {
     tiled_sobol(static_cast<std::uint32_t>(params_.search.points_final), seeds_for(task_, Purpose::kFinalPoints, 0), ws_.final_points);
     const std::array<Body, 2> bodies = {Body(pair.bodies[0], params_.noise), Body(pair.bodies[1], params_.noise)};
     double fitness = 1.0;
     crosses_wall = false;
+    std::array<Footing, 2> footings;
     for (std::size_t k = 0; k < 2; ++k) {
       ws_.near.clear();
       ws_.near.push_back(&bodies[1 - k]);
@@ -127,7 +131,12 @@ class Scorer {
       count_overlaps(bodies[k], ws_.near, params_.dish.radius_um, ws_.final_points, ws_.overlap, ws_.counts);
       fitness = std::min(fitness, ws_.counts.fitness());
       crosses_wall = crosses_wall || ws_.counts.outside_wall_count > 0;
+      const std::vector<std::uint32_t>& shared = ws_.counts.shared_counts;  // the sibling's first
+      const auto most = std::max_element(shared.begin() + 1, shared.end());
+      footings[k] = {reaches_dish(bodies[k]), ws_.counts.hit_count, most == shared.end() ? 0 : *most, shared.front()};
     }
+    supported = params_.layers == Layers::kMono || is_supported(footings);
+    if (!supported) return 0.0;
     if (fitness > 0.0 && params_.contact.neighbour_retained_min > 0.0) {
       // Neighbours are judged on fresh points too.
       tiled_sobol(static_cast<std::uint32_t>(params_.search.points_final), seeds_for(task_, Purpose::kRetained, 1), ws_.retained_points);
@@ -137,6 +146,15 @@ class Scorer {
   }
 
  private:
+  // The voxels know how many older cells hold a point, not which: in the search they hold a body up together.
+  Footing footing(const kernel::PairScore& score, std::size_t k) const {
+    const kernel::CandidateBody& body = ws_.candidate[k];
+    const float* up = body.axes + 6;
+    const float height = body.centre[2] - ws_.scene.dish_z;
+    const bool on_dish = height <= std::sqrt((up[0] * up[0] + up[1] * up[1]) + up[2] * up[2]);
+    return {on_dish, score.hits[k], score.shared[k] - score.sibling[k], score.sibling[k]};
+  }
+
   // Puts into the voxels every neighbour that a body of this reach can meet.
   void cover(float reach_um) {
     // The margin is for rounding alone.
@@ -184,7 +202,7 @@ class Search {
     SearchResult result;
     result.pair = decode(best_.chromosome, task_.frame, params_);
     result.search_fitness = best_.fitness;
-    result.fitness = scorer_.score_finally(result.pair, result.crosses_wall);
+    result.fitness = scorer_.score_finally(result.pair, result.crosses_wall, result.supported);
     result.evaluation_count = evaluation_count_;
     result.corrected = corrected_;
     result.work = {1, evaluation_count_, ws_.overlap.work.field_count, ws_.overlap.work.noise_count};
