@@ -73,7 +73,7 @@ class CanonicalBytes {
   std::vector<std::uint8_t> heap_;             // empty while inline_ suffices
 };
 
-/// digest(k) from digest(k-1) and the canonical bytes of event k, which are used up: the link before is written in front of them.
+/// digest(k) from digest(k-1) and the canonical bytes of event k, which are used up: the link before is written in front.
 Digest chain(const Digest& previous, CanonicalBytes&& event);
 
 }  // namespace colony

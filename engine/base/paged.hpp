@@ -16,7 +16,7 @@
 
 namespace colony {
 
-/// T: default constructible and copyable. An element's address holds until it is popped, or the whole is assigned or moved from.
+/// T: default constructible and copyable. An element's address holds until it is popped, or the whole is assigned to.
 template <class T>
 class Paged {
  public:
@@ -77,7 +77,9 @@ class Paged {
       std::copy(from, from + std::min(kPageSize, size_ - begin), pages_.back().get());
     }
   }
-  Paged(Paged&& other) noexcept : pages_(std::move(other.pages_)), size_(std::exchange(other.size_, 0)) { other.pages_.clear(); }
+  Paged(Paged&& other) noexcept : pages_(std::move(other.pages_)), size_(std::exchange(other.size_, 0)) {
+    other.pages_.clear();
+  }
   Paged& operator=(const Paged& other) { return *this = Paged(other); }
   Paged& operator=(Paged&& other) noexcept {
     pages_ = std::move(other.pages_);

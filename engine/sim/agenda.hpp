@@ -1,6 +1,7 @@
-// agenda: what is due, in the serial order (due time, kind, cell id). Derived from the cells alone: rebuilt from events, never stored.
-// Method:  a heap of four children a node, and for each due time of a cell its place in the heap. So an item is changed or taken
-//          out where it stands: there are exactly as many items as due times, however long the history, and nothing to clean up.
+// agenda: what is due, in the serial order (due time, kind, cell id). Derived from the cells alone: rebuilt from events, never
+// stored.
+// Method:  a heap of four children a node, and for each due time of a cell its place in the heap. So an item is changed or
+//          taken out where it stands: exactly as many items as due times, however long the history, and nothing to clean up.
 // Memory:  16 bytes an item, and 4 for each id up to the highest that ever had an item of the kind.
 // Threads: const functions on many threads; follow is exclusive.
 #pragma once
@@ -63,7 +64,8 @@ class Agenda {
   static constexpr std::size_t kChildren = 4;
 
   Paged<AgendaItem> heap_;                    // no item before its parent, (index - 1) / kChildren
-  std::array<Paged<std::uint32_t>, kDueKindCount> places_;  // by kind, then id.value - 1: 1 + index in heap_; 0 or beyond: no item
+  // By kind, then id.value - 1: 1 + index in heap_; 0, or beyond the end: no item.
+  std::array<Paged<std::uint32_t>, kDueKindCount> places_;
 };
 
 }  // namespace colony

@@ -26,7 +26,9 @@ Grid::Grid(double half_extent_max_um)
   CHECK(half_extent_max_um > 0.0);
 }
 
-Grid::Column Grid::column_at(double x_um, double y_um) const { return {column_of(x_um, pitch_um_), column_of(y_um, pitch_um_)}; }
+Grid::Column Grid::column_at(double x_um, double y_um) const {
+  return {column_of(x_um, pitch_um_), column_of(y_um, pitch_um_)};
+}
 
 std::size_t Grid::slot_of(Column column) const {
   // Both indices in one word, mixed by a multiplication with an odd constant; its high bits depend on all of both.

@@ -1,8 +1,8 @@
 // grid: which cells may be near a place. Square columns over the dish; a cell is listed in the column of its centre.
 // Method:  an open hash table of the columns that hold cells (the plane has no edge and most of it is empty); the cells of a
 //          column are a list linked through one number a cell.
-// Memory:  4 bytes for each id up to the highest listed; 12 to 32 for each column that holds cells, half as much again for the moment
-//          in which the table doubles. A founder alone in its column is the worst case; in tissue a column holds three cells or more.
+// Memory:  4 bytes for each id up to the highest listed; 16 to 32 for each column that holds cells, half as much again while
+//          the table doubles. A founder alone in its column is the worst case; in tissue a column holds three cells or more.
 // Threads: queries are pure; put and remove are exclusive.
 #pragma once
 

@@ -78,6 +78,11 @@ float smooth_at(const FloatBody& b, float x, float y, float z, float& noise) {
 
 }  // namespace
 
+float smooth_reference(const FloatBody& b, float x, float y, float z) {
+  float noise = 0.0F;
+  return smooth_at(b, x, y, z, noise);
+}
+
 bool is_inside_reference(const FloatBody& b, float x, float y, float z) {
   float noise = 0.0F;
   const float smooth = smooth_at(b, x, y, z, noise);

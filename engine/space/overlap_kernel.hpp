@@ -53,6 +53,8 @@ void count_each(std::span<const FloatBody> bodies, const float* x, const float* 
 
 /// The twin of one point in plain C++: no shortcut, the noise always evaluated.
 bool is_inside_reference(const FloatBody& body, float x, float y, float z);
+/// The field without noise, plain C++.
+float smooth_reference(const FloatBody& body, float x, float y, float z);
 /// Gardner's noise at (u, v, w) in the cell's frame, plain C++.
 float noise_reference(const FloatBody& body, float u, float v, float w);
 

@@ -83,14 +83,14 @@ PairScore score_pair_reference(const SearchScene& scene, const std::array<Candid
       const float wx = x - scene.wall_x;
       const float wy = y - scene.wall_y;
       if (scene.has_wall && wx * wx + wy * wy > scene.wall_radius2) score.beyond_wall = true;
-      if (is_inside_reference(pair[1 - k].field, x, y, z)) {
+      if (smooth_reference(pair[1 - k].field, x, y, z) >= 0.0F) {
         ++score.sibling[k];
         ++score.shared[k];
       }
       const auto cube = [&](float p, int axis) {
         return ((p * scene.voxels_per_um + scene.voxel_shift[axis]) + 12582912.0F) - 12582912.0F;
       };
-      score.shared[k] += scene.counts[static_cast<std::size_t>((cube(z, 2) * scene.voxels_x + cube(y, 1)) * scene.voxels_x + cube(x, 0))];
+      score.shared[k] += scene.counts[static_cast<std::size_t>((std::max(0.0F, cube(z, 2)) * scene.voxels_x + cube(y, 1)) * scene.voxels_x + cube(x, 0))];
     }
   }
   return score;

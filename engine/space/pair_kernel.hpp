@@ -1,7 +1,9 @@
 // pair_kernel: how much of a candidate pair's two bodies lies inside their neighbours: what the search for free space spends its time on.
 // Method:  points are given once a search in the unit frame of each body (u, v, w), where the body's own field, noise included, is
 //          the same for every candidate: only the points inside it are kept. A candidate maps them to the dish by its affine frame;
-//          those below the dish drop out; the rest ask the voxels how many neighbours cover them, and the sibling's field whether it does.
+//          those below the dish drop out; the rest ask the voxels how many neighbours cover them, and the sibling's noise-free field whether
+//          it does: its noise moves a point in or out as often as not, and leaving it out loses nothing (engine/DESIGN.md); the winner is
+//          scored with it.
 //          Scoring goes through the points in stages and gives up once too many are shared (ShareLimit).
 // Units:   um relative to the search's origin, single precision.
 // Why the same bits everywhere: as overlap_kernel.hpp: + - * and compares in a fixed order per point; integers leave the kernel.
@@ -68,7 +70,7 @@ using ShareLimit = std::span<const std::uint32_t>;
 
 PairScore score_pair(const SearchScene& scene, const std::array<CandidateBody, 2>& pair, ShareLimit most_shared, CountWork& work);
 
-/// The twin: every point on its own, the sibling's noise always, nobody given up. The same counts to the last bit.
+/// The twin: every point on its own, nobody given up. The same counts to the last bit.
 PairScore score_pair_reference(const SearchScene& scene, const std::array<CandidateBody, 2>& pair);
 
 /// Fills flags[0..n) with 1 where the point is inside `body`, else 0.

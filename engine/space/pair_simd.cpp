@@ -40,7 +40,6 @@ HWY_INLINE Tally tally(const SearchScene& scene, const CandidateBody& body, cons
   const std::size_t lanes = hn::Lanes(d);
   std::size_t hits = 0;
   std::size_t in_sibling = 0;
-  std::size_t noisy = 0;
   std::uint32_t covering = 0;
   const float* a = body.axes;
   const V scale = constant(scene.voxels_per_um);
@@ -62,7 +61,8 @@ HWY_INLINE Tally tally(const SearchScene& scene, const CandidateBody& body, cons
     }
     const V cube_x = cube_of(hn::Add(hn::Mul(x, scale), constant(scene.voxel_shift[0])));
     const V cube_y = cube_of(hn::Add(hn::Mul(y, scale), constant(scene.voxel_shift[1])));
-    const V cube_z = cube_of(hn::Add(hn::Mul(z, scale), constant(scene.voxel_shift[2])));
+    // A point on the dish may round to below it; along x and y the box of cubes has room to spare.
+    const V cube_z = hn::Max(hn::Zero(d), cube_of(hn::Add(hn::Mul(z, scale), constant(scene.voxel_shift[2]))));
     // Exact: all whole numbers below 2^23.
     const V cube = hn::Add(hn::Mul(hn::Add(hn::Mul(cube_z, nx), cube_y), nx), cube_x);
     covering += look_up(scene.counts, hn::IfThenElse(above, cube, constant(scene.empty_cube)));
@@ -71,20 +71,9 @@ HWY_INLINE Tally tally(const SearchScene& scene, const CandidateBody& body, cons
     const V sv = row(sibling.m + 3, sibling.t[1], x, y, z);
     const V sw = row(sibling.m + 6, sibling.t[2], x, y, z);
     const V smooth = smooth_field(su, sv, sw);
-    const auto near = hn::And(above, hn::Ge(smooth, constant(-sibling.band)));
-    if (hn::AllFalse(d, near)) continue;
-    const auto inside = hn::And(near, hn::Gt(smooth, constant(sibling.band)));
-    const auto undecided = hn::AndNot(inside, near);
-    if (hn::AllFalse(d, undecided)) {
-      in_sibling += hn::CountTrue(d, inside);
-      continue;
-    }
-    noisy += hn::CountTrue(d, undecided);
-    const V field = hn::Add(smooth, noise(sibling, su, sv, sw));
-    in_sibling += hn::CountTrue(d, hn::Or(inside, hn::And(undecided, hn::Ge(field, hn::Zero(d)))));
+    in_sibling += hn::CountTrue(d, hn::And(above, hn::Ge(smooth, hn::Zero(d))));
   }
   work.field_count += hits;
-  work.noise_count += noisy;
   return {static_cast<std::uint32_t>(hits), covering, static_cast<std::uint32_t>(in_sibling)};
 }
 
