@@ -107,7 +107,7 @@ class Scorer {
       fitness = std::min(fitness, share_left(score.hits[k], score.shared[k]));
     }
     if (score.dropped || !(fitness > 0.0)) return fitness;
-    if (params_.layers == Layers::kMulti && !is_supported({footing(score, 0), footing(score, 1)})) return 0.0;
+    if (params_.layers == Layers::kMulti && !is_supported({footing(score, 0), footing(score, 1)}, kSupportPercentInSearch)) return 0.0;
     if (!(params_.contact.neighbour_retained_min > 0.0)) return fitness;
     const Pair pair = decode(chromosome, task_.frame, params_);
     const std::array<Body, 2> bodies = {Body(pair.bodies[0], params_.noise), Body(pair.bodies[1], params_.noise)};
@@ -135,7 +135,7 @@ class Scorer {
       const auto most = std::max_element(shared.begin() + 1, shared.end());
       footings[k] = {reaches_dish(bodies[k]), ws_.counts.hit_count, most == shared.end() ? 0 : *most, shared.front()};
     }
-    supported = params_.layers == Layers::kMono || is_supported(footings);
+    supported = params_.layers == Layers::kMono || is_supported(footings, kSupportPercent);
     if (!supported) return 0.0;
     if (fitness > 0.0 && params_.contact.neighbour_retained_min > 0.0) {
       // Neighbours are judged on fresh points too.
@@ -238,6 +238,10 @@ class Search {
     Stream first = stream(0);
     for (std::size_t i = 0; i < population_size_; ++i) population.push_back({random_chromosome(gene_count_, bits(), first), kUnscored});
     population[0].chromosome.set_code(kTurn, code_of(0.5, bits(), params_.search.coding));  // the unturned plane
+    // With layers, both on the dish: where nobody else is near, one population in ten has no other supported pair to breed from.
+    for (int gene = kFirstHeight; gene < gene_count_; ++gene) {
+      population[0].chromosome.set_code(gene, code_of(0.0, bits(), params_.search.coding));
+    }
     evaluate(population, 0);
     hopeless_ = is_hopeless(0);
     for (std::int64_t generation = 1; generation <= params_.search.generations && !good() && !hopeless_; ++generation) {
