@@ -43,7 +43,7 @@ GeneTables::GeneTables(const Params& params)
   }, elongation_);
   column([&](double x) {
     const double flatness = on(params.cell.flatness, x);
-    return Two{f(1.0 / maths::cbrt(flatness)), f(flatness)};
+    return Flatness{f(1.0 / maths::cbrt(flatness)), f(flatness), f(1.0 / flatness)};
   }, flatness_);
   column([&](double x) { return cos_sin(maths::kPi * x); }, rotation_);
   column([&](double x) { return cos_sin(symmetric(params.search.tilt_max_deg * kRadiansPerDegree, x)); }, tilt_);
@@ -58,7 +58,7 @@ void GeneTables::decode(const Chromosome& chromosome, const PairFrame& frame, st
   const float nx = turn.first * f(frame.direction.x()) - turn.second * f(frame.direction.y());
   const float ny = turn.second * f(frame.direction.x()) + turn.first * f(frame.direction.y());
   const float nz = f(frame.direction.z());
-  const float length = std::sqrt(nx * nx + ny * ny);
+  const float length = layers_ == Layers::kMono ? 1.0F : std::sqrt(nx * nx + ny * ny);
   const float across_x = length > 1e-9F ? -ny / length : 1.0F;
   const float across_y = length > 1e-9F ? nx / length : 0.0F;
   const Two share = smaller_share_[code(kSmallerShare)];
@@ -67,11 +67,11 @@ void GeneTables::decode(const Chromosome& chromosome, const PairFrame& frame, st
   for (int k = 0; k < 2; ++k) {
     const int first = kFirstOfBody + k * kBodyGeneCount;
     const Two elongation = elongation_[code(first + kElongation)];
-    const Two flatness = flatness_[code(first + kFlatness)];
-    const float mean = volume * (k == 0 ? share.first : share.second) * flatness.first;
+    const Flatness flatness = flatness_[code(first + kFlatness)];
+    const float mean = volume * (k == 0 ? share.first : share.second) * flatness.mean;
     const float a = mean * elongation.first;
     const float b = mean * elongation.second;
-    const float c = mean * flatness.second;
+    const float c = mean * flatness.flatness;
     const Two rotation = rotation_[code(first + kRotation)];
     const Two tilt_x = tilt_[code(first + kTiltX)];
     const Two tilt_y = tilt_[code(first + kTiltY)];
@@ -86,7 +86,8 @@ void GeneTables::decode(const Chromosome& chromosome, const PairFrame& frame, st
                               xz,                  yz,        zz};
     kernel::CandidateBody& body = pair[static_cast<std::size_t>(k)];
     const float semiaxes[3] = {a, b, c};
-    const float inverse[3] = {1.0F / a, 1.0F / b, 1.0F / c};
+    const float inverse_mean = 1.0F / mean;
+    const float inverse[3] = {inverse_mean * elongation.second, inverse_mean * elongation.first, inverse_mean * flatness.inverse};
     float width2 = 0.0F;
     for (int i = 0; i < 3; ++i) {
       for (int row = 0; row < 3; ++row) {

@@ -25,6 +25,9 @@ class GeneTables {
   struct Two {
     float first = 0.0F, second = 0.0F;
   };
+  struct Flatness {
+    float mean = 0.0F, flatness = 0.0F, inverse = 0.0F;
+  };
   using Column = std::vector<float>;
   using Columns = std::vector<Two>;
 
@@ -34,7 +37,7 @@ class GeneTables {
   Column pair_volume_;      // cbrt(3 V / (4 pi))
   Columns smaller_share_;   // cbrt(1 - share), cbrt(share)
   Columns elongation_;      // sqrt(e), 1 / sqrt(e)
-  Columns flatness_;        // f^(-1/3), f
+  std::vector<Flatness> flatness_;   // f^(-1/3), f, 1 / f
   Columns rotation_;        // cos, sin
   Columns tilt_;            // cos, sin
   Column distance_;

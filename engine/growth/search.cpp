@@ -6,6 +6,9 @@
 #include <tuple>
 #include <utility>
 
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
 #include "engine/base/check.hpp"
 #include "engine/growth/support.hpp"
 #include "engine/space/overlap.hpp"
@@ -22,6 +25,7 @@ std::array<std::uint32_t, 3> seeds_for(const SearchTask& task, Purpose purpose, 
 }
 
 constexpr double kGiveUpMarginLast = 0.02;
+constexpr std::size_t kPointsWorthThreads = 65'536;   // of a generation: 100 us
 
 double share_left(std::uint32_t hits, std::uint32_t shared) {
   return shared >= hits ? 0.0 : static_cast<double>(hits - shared) / static_cast<double>(hits);
@@ -54,7 +58,7 @@ class Scorer {
     scene.voxels_x = static_cast<float>(ws_.voxels.nx());
     scene.empty_cube = static_cast<float>(ws_.voxels.empty_cube());
     scene.voxels_per_um = static_cast<float>(1.0 / ws_.voxels.edge_um());
-    const Vec3 shift = (c - ws_.voxels.corner_um()) / ws_.voxels.edge_um() - Vec3::Constant(0.5);
+    const Vec3 shift = (c - ws_.voxels.corner_um()) / ws_.voxels.edge_um() - Vec3(0.5, 0.5, 0.5 - kVoxelLift);
     for (int i = 0; i < 3; ++i) scene.voxel_shift[i] = static_cast<float>(shift[i]);
     scene.dish_z = static_cast<float>(-c.z());
     scene.has_wall = false;
@@ -94,33 +98,61 @@ class Scorer {
     racing_ = best > 0.0;
   }
 
-  /// On the points of the search. Below the best if it was given up, 0 if nothing holds it up.
-  double score(const Chromosome& chromosome) {
-    ws_.genes.decode(chromosome, task_.frame, ws_.candidate);
-    const kernel::ShareLimit limit = racing_ ? kernel::ShareLimit(ws_.most_shared) : kernel::ShareLimit();
-    cover(std::max(ws_.candidate[0].reach, ws_.candidate[1].reach));
-    const kernel::PairScore score = kernel::score_pair(ws_.scene, ws_.candidate, limit, ws_.overlap.work);
-    if (score.beyond_wall) return 0.0;
-    double fitness = 1.0;
-    for (std::size_t k = 0; k < 2; ++k) {
-      if (score.hits[k] == 0 && score.dropped) continue;  // not looked at
-      fitness = std::min(fitness, share_left(score.hits[k], score.shared[k]));
+  /// Scores every candidate without a score, on the points of the search. One that is given up gets a fitness below the best, one that
+  /// nothing holds up 0.
+  void score_all(std::vector<Candidate>& candidates) {
+    std::size_t count = 0;
+    for (const Candidate& candidate : candidates) count += candidate.fitness < 0.0 ? 1 : 0;
+    if (ws_.threads == 1 || !is_worth_threads(count)) {
+      for (Candidate& candidate : candidates) {
+        if (candidate.fitness < 0.0) candidate.fitness = score(candidate.chromosome, ws_.candidate, ws_.overlap.work);
+      }
+      return;
     }
-    if (score.dropped || !(fitness > 0.0)) return fitness;
-    if (params_.layers == Layers::kMulti && !is_supported({footing(score, 0), footing(score, 1)}, kSupportPercentInSearch)) return 0.0;
-    if (!(params_.contact.neighbour_retained_min > 0.0)) return fitness;
-    const Pair pair = decode(chromosome, task_.frame, params_);
-    const std::array<Body, 2> bodies = {Body(pair.bodies[0], params_.noise), Body(pair.bodies[1], params_.noise)};
-    return neighbours_keep_enough(bodies) ? fitness : 0.0;
+    // The voxels are filled first, for all of them: then scoring changes nothing but its own slot, and a slot's value does not depend on who
+    // scores it or when. Isolated: a thread that waits here must not begin another event.
+    for (const Candidate& candidate : candidates) {
+      ws_.genes.decode(candidate.chromosome, task_.frame, ws_.candidate);
+      cover(std::max(ws_.candidate[0].reach, ws_.candidate[1].reach));
+    }
+    ws_.work_of.assign(candidates.size(), {});
+    tbb::this_task_arena::isolate([&] {
+      tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t i) {
+        if (!(candidates[i].fitness < 0.0)) return;
+        std::array<kernel::CandidateBody, 2> bodies = ws_.candidate;
+        candidates[i].fitness = score(candidates[i].chromosome, bodies, ws_.work_of[i]);
+      });
+    });
+    for (const kernel::CountWork& work : ws_.work_of) ws_.overlap.work += work;
   }
 
   /// On the fresh points, by the definition.
   double score_finally(const Pair& pair, bool& crosses_wall, bool& supported) {
-    tiled_sobol(static_cast<std::uint32_t>(params_.search.points_final), seeds_for(task_, Purpose::kFinalPoints, 0), ws_.final_points);
+    const std::array<std::uint32_t, 3> seeds = seeds_for(task_, Purpose::kFinalPoints, 0);
+    const auto final_count = static_cast<std::uint32_t>(params_.search.points_final);
     const std::array<Body, 2> bodies = {Body(pair.bodies[0], params_.noise), Body(pair.bodies[1], params_.noise)};
+    if (params_.division.inhibition && final_count > kLookPoints) {
+      scrambled_sobol(kLookPoints, seeds, ws_.final_points);
+      const double fitness = fitness_of(bodies, crosses_wall);
+      if (fitness < params_.contact.fitness_min - kLookMargin) return fitness;
+    }
+    tiled_sobol(final_count, seeds, ws_.final_points);
+    const double fitness = fitness_of(bodies, crosses_wall);
+    supported = params_.layers == Layers::kMono || is_supported(footings_, kSupportPercent);
+    if (!supported) return 0.0;
+    if (fitness > 0.0 && params_.contact.neighbour_retained_min > 0.0) {
+      // Neighbours are judged on fresh points too.
+      tiled_sobol(static_cast<std::uint32_t>(params_.search.points_final), seeds_for(task_, Purpose::kRetained, 1), ws_.retained_points);
+      if (!neighbours_keep_enough(bodies)) return 0.0;
+    }
+    return fitness;
+  }
+
+ private:
+  // Of a pair, on ws_.final_points. Also fills footings_.
+  double fitness_of(const std::array<Body, 2>& bodies, bool& crosses_wall) {
     double fitness = 1.0;
     crosses_wall = false;
-    std::array<Footing, 2> footings;
     for (std::size_t k = 0; k < 2; ++k) {
       ws_.near.clear();
       ws_.near.push_back(&bodies[1 - k]);
@@ -133,24 +165,44 @@ class Scorer {
       crosses_wall = crosses_wall || ws_.counts.outside_wall_count > 0;
       const std::vector<std::uint32_t>& shared = ws_.counts.shared_counts;  // the sibling's first
       const auto most = std::max_element(shared.begin() + 1, shared.end());
-      footings[k] = {reaches_dish(bodies[k]), ws_.counts.hit_count, most == shared.end() ? 0 : *most, shared.front()};
-    }
-    supported = params_.layers == Layers::kMono || is_supported(footings, kSupportPercent);
-    if (!supported) return 0.0;
-    if (fitness > 0.0 && params_.contact.neighbour_retained_min > 0.0) {
-      // Neighbours are judged on fresh points too.
-      tiled_sobol(static_cast<std::uint32_t>(params_.search.points_final), seeds_for(task_, Purpose::kRetained, 1), ws_.retained_points);
-      if (!neighbours_keep_enough(bodies)) return 0.0;
+      footings_[k] = {reaches_dish(bodies[k]), ws_.counts.hit_count, most == shared.end() ? 0 : *most, shared.front()};
     }
     return fitness;
   }
 
- private:
+  // About 1.5 ns a point of the search and candidate; asking neighbours what they keep costs far more. Handing work to a thread costs some
+  // microseconds: at the defaults (32 candidates of 256 points, 10 us) it would only cost.
+  bool is_worth_threads(std::size_t candidate_count) const {
+    return candidate_count > 1 && (params_.contact.neighbour_retained_min > 0.0 ||
+                                   candidate_count * static_cast<std::size_t>(params_.search.points) >= kPointsWorthThreads);
+  }
+
+  double score(const Chromosome& chromosome, std::array<kernel::CandidateBody, 2>& candidate, kernel::CountWork& work) {
+    ws_.genes.decode(chromosome, task_.frame, candidate);
+    const kernel::ShareLimit limit = racing_ ? kernel::ShareLimit(ws_.most_shared) : kernel::ShareLimit();
+    cover(std::max(candidate[0].reach, candidate[1].reach));
+    const kernel::PairScore score = kernel::score_pair(ws_.scene, candidate, limit, work);
+    if (score.beyond_wall) return 0.0;
+    double fitness = 1.0;
+    for (std::size_t k = 0; k < 2; ++k) {
+      if (score.hits[k] == 0 && score.dropped) continue;  // not looked at
+      fitness = std::min(fitness, share_left(score.hits[k], score.shared[k]));
+    }
+    if (score.dropped || !(fitness > 0.0)) return fitness;
+    if (params_.layers == Layers::kMulti &&
+        !is_supported({footing(score, candidate, 0), footing(score, candidate, 1)}, kSupportPercentInSearch)) {
+      return 0.0;
+    }
+    if (!(params_.contact.neighbour_retained_min > 0.0)) return fitness;
+    const Pair pair = decode(chromosome, task_.frame, params_);
+    const std::array<Body, 2> bodies = {Body(pair.bodies[0], params_.noise), Body(pair.bodies[1], params_.noise)};
+    return neighbours_keep_enough(bodies) ? fitness : 0.0;
+  }
+
   // The voxels know how many older cells hold a point, not which: in the search they hold a body up together.
-  Footing footing(const kernel::PairScore& score, std::size_t k) const {
-    const kernel::CandidateBody& body = ws_.candidate[k];
-    const float* up = body.axes + 6;
-    const float height = body.centre[2] - ws_.scene.dish_z;
+  Footing footing(const kernel::PairScore& score, const std::array<kernel::CandidateBody, 2>& candidate, std::size_t k) const {
+    const float* up = candidate[k].axes + 6;
+    const float height = candidate[k].centre[2] - ws_.scene.dish_z;
     const bool on_dish = height <= std::sqrt((up[0] * up[0] + up[1] * up[1]) + up[2] * up[2]);
     return {on_dish, score.hits[k], score.shared[k] - score.sibling[k], score.sibling[k]};
   }
@@ -183,6 +235,7 @@ class Scorer {
   const SearchTask& task_;
   Workspace& ws_;
   bool racing_ = false;
+  std::array<Footing, 2> footings_;
   std::size_t covered_ = 0;   // of by_gap: those in the voxels
 };
 
@@ -218,17 +271,15 @@ class Search {
   // he cannot beat it. The best used for that is never one of the generation in flight, so the order of scoring cannot matter.
   void evaluate(std::vector<Candidate>& candidates, std::size_t first) {
     throw_if_stopped(stop_);
-    for (std::size_t i = first; i < candidates.size(); ++i) {
-      ++evaluation_count_;
-      if (candidates[i].fitness < 0.0) candidates[i].fitness = scorer_.score(candidates[i].chromosome);
-    }
+    evaluation_count_ += static_cast<std::uint32_t>(candidates.size() - first);
+    scorer_.score_all(candidates);
     // The first with the highest fitness.
     std::size_t best = 0;
     for (std::size_t i = 1; i < candidates.size(); ++i) {
       if (candidates[i].fitness > candidates[best].fitness) best = i;
     }
     best_ = candidates[best];
-    scorer_.race_to(best_.fitness);
+    if (task_.racing) scorer_.race_to(best_.fitness);
   }
 
   void predict() {

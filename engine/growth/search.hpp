@@ -25,11 +25,12 @@ struct SearchTask {
   CellId cell_id;               // the dividing cell: not a neighbour of its own daughters
   std::uint32_t ordinal = 0;
   PairFrame frame;
+  bool racing = true;           // false: every candidate is scored on all points, for tests of what giving candidates up costs
 };
 
 struct SearchResult {
   Pair pair;                    // the winner
-  double fitness = 0.0;         // on the fresh points
+  double fitness = 0.0;         // on the fresh points (the first kLookPoints of them where the pair fails by far)
   double search_fitness = 0.0;  // on the points of the search
   std::uint32_t evaluation_count = 0;
   bool corrected = false;

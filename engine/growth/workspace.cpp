@@ -4,7 +4,7 @@
 
 namespace colony {
 
-Workspace::Workspace(const Params& params) : genes(params), voxels(params), rasters(voxels.edge_um()) {
+Workspace::Workspace(const Params& params, int thread_count) : threads(thread_count), genes(params), voxels(params), rasters(voxels.edge_um()) {
   const int bits = static_cast<int>(params.search.bits);
   const int gene_count = gene_count_of(params.layers);
   const int length = gene_count * bits;

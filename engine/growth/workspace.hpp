@@ -39,10 +39,12 @@ struct Candidate {
 };
 
 struct Workspace {
-  /// Tables for searches with these parameters, and only with these.
-  explicit Workspace(const Params& params);
+  /// Tables for searches with these parameters, and only with these. `threads` > 1: a generation that is worth it is scored by as many
+  /// (of the caller's oneTBB arena).
+  explicit Workspace(const Params& params, int threads = 1);
 
   // Fixed after construction.
+  int threads;
   GeneTables genes;
   BitFlips mutation;
   BitFlips correction;                  // of the low bits of all genes
@@ -56,6 +58,7 @@ struct Workspace {
   VoxelCounts voxels;
   RasterCache rasters;
   std::array<kernel::CandidateBody, 2> candidate;
+  std::vector<kernel::CountWork> work_of;             // a candidate, where threads score them
   std::vector<std::uint32_t> most_shared;
   struct Neighbour {
     float gap_um = 0.0F;                // no candidate of less reach can meet it

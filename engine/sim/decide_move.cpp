@@ -18,8 +18,6 @@ namespace colony {
 namespace {
 
 constexpr std::uint32_t kSurroundingsPoints = 256;
-constexpr std::uint32_t kPrefixPoints = 256;
-constexpr double kHopeless = 0.15;  // five standard errors of fitness on the prefix
 
 /// Unit vector towards the freer half of the disc of free_radius_um about the cell; none where there is no such half: nothing of the
 /// disc is covered, or all of it. The disc's own centroid is the centre, so the centroid of what is free lies opposite to the
@@ -88,11 +86,10 @@ bool fits(const Colony& colony, const Params& params, Seed seed, const Cell& cel
   PointSet& points = workspace.points;
   OverlapScratch& scratch = workspace.overlap;
   OverlapCounts& counts = workspace.counts;
-  if (final_count > kPrefixPoints) {
-    // Most moves of enclosed cells fail by far: the first points of the same set tell, at a fraction of the cost.
-    scrambled_sobol(kPrefixPoints, seeds, points);
+  if (final_count > kLookPoints) {
+    scrambled_sobol(kLookPoints, seeds, points);
     count_overlaps(moved, neighbours, params.dish.radius_um, points, scratch, counts);
-    if (counts.outside_wall_count > 0 || counts.fitness() < params.contact.fitness_min - kHopeless) return false;
+    if (counts.outside_wall_count > 0 || counts.fitness() < params.contact.fitness_min - kLookMargin) return false;
   }
   tiled_sobol(final_count, seeds, points);
   count_overlaps(moved, neighbours, params.dish.radius_um, points, scratch, counts);

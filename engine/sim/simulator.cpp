@@ -141,7 +141,7 @@ std::optional<Event> Simulator::step() {
 
 Workspace& Simulator::workspace_of(std::size_t worker) {
   std::unique_ptr<Workspace>& own = workspaces_[worker];
-  if (!own) own = std::make_unique<Workspace>(spec_.params);
+  if (!own) own = std::make_unique<Workspace>(spec_.params, crew_.size());
   return *own;
 }
 

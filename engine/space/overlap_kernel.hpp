@@ -45,6 +45,11 @@ std::uint32_t select_inside(const FloatBody& body, const float* x, const float* 
 struct CountWork {
   std::uint64_t field_count = 0;     // evaluations of one body's field at one point
   std::uint64_t noise_count = 0;     // of those, with noise
+  CountWork& operator+=(const CountWork& other) {
+    field_count += other.field_count;
+    noise_count += other.noise_count;
+    return *this;
+  }
 };
 
 /// counts[j] = how many of n points are inside bodies[j]. Fast where neighbouring points of the arrays are neighbours in space.

@@ -13,15 +13,6 @@ void pad(std::vector<float>& values, std::size_t n) {
   if (values.size() < n + kPadding) values.resize(n + kPadding);
 }
 
-// Orders directions in the plane like the angle does, without trigonometry: 0..4.
-float pseudo_angle(float u, float v) {
-  const float sum = std::abs(u) + std::abs(v);
-  if (!(sum > 0.0F)) return 0.0F;
-  const float quarter = v / sum;
-  if (u < 0.0F) return 2.0F - quarter;
-  return v < 0.0F ? 4.0F + quarter : quarter;
-}
-
 }  // namespace
 
 void select_own_points(const FloatBody& field, float noisy_scale, const PointSet& unit_points, OwnPoints& out) {
@@ -50,19 +41,6 @@ void select_own_points(const FloatBody& field, float noisy_scale, const PointSet
   std::uint32_t end = 0;
   for (const std::uint32_t size : kStageSizes) out.stage_ends.push_back(end = std::min(inside, end + size));
   out.stage_ends.push_back(inside);
-
-  std::uint32_t first = 0;
-  for (const std::uint32_t last : out.stage_ends) {
-    out.order.clear();
-    for (std::uint32_t i = first; i < last; ++i) out.order.push_back({pseudo_angle(out.u[i], out.v[i]), out.u[i], out.v[i], out.w[i]});
-    std::sort(out.order.begin(), out.order.end());  // all four numbers: one order only
-    for (std::uint32_t i = first; i < last; ++i) {
-      out.u[i] = out.order[i - first][1];
-      out.v[i] = out.order[i - first][2];
-      out.w[i] = out.order[i - first][3];
-    }
-    first = last;
-  }
 }
 
 PairScore score_pair_reference(const SearchScene& scene, const std::array<CandidateBody, 2>& pair) {
@@ -90,7 +68,7 @@ PairScore score_pair_reference(const SearchScene& scene, const std::array<Candid
       const auto cube = [&](float p, int axis) {
         return ((p * scene.voxels_per_um + scene.voxel_shift[axis]) + 12582912.0F) - 12582912.0F;
       };
-      score.shared[k] += scene.counts[static_cast<std::size_t>((std::max(0.0F, cube(z, 2)) * scene.voxels_x + cube(y, 1)) * scene.voxels_x + cube(x, 0))];
+      score.shared[k] += scene.counts[static_cast<std::size_t>((cube(z, 2) * scene.voxels_x + cube(y, 1)) * scene.voxels_x + cube(x, 0))];
     }
   }
   return score;

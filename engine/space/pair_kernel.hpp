@@ -22,13 +22,12 @@
 
 namespace colony::kernel {
 
-/// Points of the unit frame inside the noisy body. Each stage is a fair sample (a run of the Sobol sequence), sorted by direction so that
-/// the points of one vector lie close together. Stage k ends before stage_ends[k].
+/// Points of the unit frame inside the noisy body, in the order of the Sobol sequence: each stage is a fair sample. Stage k ends before
+/// stage_ends[k].
 struct OwnPoints {
   std::vector<float> u, v, w;           // padded by kPadding
   std::vector<std::uint32_t> stage_ends;
   std::vector<std::uint8_t> flags;      // scratch of select_own_points
-  std::vector<std::array<float, 4>> order;
   std::size_t size() const { return stage_ends.empty() ? 0 : stage_ends.back(); }
 };
 

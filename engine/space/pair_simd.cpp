@@ -61,8 +61,7 @@ HWY_INLINE Tally tally(const SearchScene& scene, const CandidateBody& body, cons
     }
     const V cube_x = cube_of(hn::Add(hn::Mul(x, scale), constant(scene.voxel_shift[0])));
     const V cube_y = cube_of(hn::Add(hn::Mul(y, scale), constant(scene.voxel_shift[1])));
-    // A point on the dish may round to below it; along x and y the box of cubes has room to spare.
-    const V cube_z = hn::Max(hn::Zero(d), cube_of(hn::Add(hn::Mul(z, scale), constant(scene.voxel_shift[2]))));
+    const V cube_z = cube_of(hn::Add(hn::Mul(z, scale), constant(scene.voxel_shift[2])));
     // Exact: all whole numbers below 2^23.
     const V cube = hn::Add(hn::Mul(hn::Add(hn::Mul(cube_z, nx), cube_y), nx), cube_x);
     covering += look_up(scene.counts, hn::IfThenElse(above, cube, constant(scene.empty_cube)));
@@ -153,9 +152,9 @@ void add_rows_kernel(const RowRange& rows, std::int32_t first_x, std::int32_t n,
         }
         if (x + 32 > n) bits = x < n ? bits & ((1U << (n - x)) - 1U) : 0;
         if (bits == 0) continue;
-        const std::uint64_t padded = bits;  // LoadMaskBits may read 8 bytes
         for (std::size_t i = 0; i < 32; i += lanes) {
-          const auto mask = hn::LoadMaskBits(bytes, reinterpret_cast<const std::uint8_t*>(&padded) + i / 8);
+          const std::uint64_t part = bits >> i;  // LoadMaskBits may read 8 bytes; lanes may be fewer than a byte's bits
+          const auto mask = hn::LoadMaskBits(bytes, reinterpret_cast<const std::uint8_t*>(&part));
           const auto before = hn::LoadU(bytes, row + x + i);
           hn::StoreU(hn::SaturatedAdd(before, hn::IfThenElseZero(mask, one)), bytes, row + x + i);
         }

@@ -20,7 +20,7 @@
 namespace colony {
 
 /// The cubes a body covers: rows along x, bit i of a row's words is cube x0 + i.
-struct Raster {
+struct VoxelRaster {
   std::int32_t x0 = 0, y0 = 0, z0 = 0;   // in edges from the origin of the dish
   std::int32_t nx = 0, ny = 0, nz = 0;
   std::int32_t words_per_row = 0;
@@ -28,16 +28,16 @@ struct Raster {
   bool holds(std::int32_t x, std::int32_t y, std::int32_t z) const;
 };
 
-void make_raster(const Body& body, double edge_um, Raster& out);
+void make_raster(const Body& body, double edge_um, VoxelRaster& out);
 /// The brute-force twin, cube by cube.
-void make_raster_reference(const Body& body, double edge_um, Raster& out);
+void make_raster_reference(const Body& body, double edge_um, VoxelRaster& out);
 
 /// Rasters of recent bodies, by cell id.
 class RasterCache {
  public:
   explicit RasterCache(double edge_um) : edge_um_(edge_um) {}
   /// Valid until the next call. Adds the evaluations it took to `field_count`.
-  const Raster& of(CellId id, const Body& body, std::uint64_t& field_count);
+  const VoxelRaster& of(CellId id, const Body& body, std::uint64_t& field_count);
 
  private:
   struct Slot {
@@ -45,7 +45,7 @@ class RasterCache {
     Vec3 centre = Vec3::Zero();
     Mat3 to_unit = Mat3::Zero();
     Vec3 noise_offset = Vec3::Zero();
-    Raster raster;
+    VoxelRaster raster;
   };
   static constexpr std::size_t kSlotsMax = 8192;   // about 6 MiB when full
 
@@ -61,7 +61,7 @@ class VoxelCounts {
 
   /// Empties it and moves it over `pivot_um`.
   void centre_on(const Vec3& pivot_um);
-  void add(const Raster& raster);
+  void add(const VoxelRaster& raster);
 
   double edge_um() const { return edge_um_; }
   std::int32_t nx() const { return n_; }
@@ -80,6 +80,10 @@ class VoxelCounts {
   std::int32_t x0_ = 0, y0_ = 0;
   std::vector<std::uint8_t> counts_;
 };
+
+/// In edges: how much higher a point is looked up than it lies. A point on the dish must not fall below the lowest cubes by rounding: it
+/// would be looked up outside the counts. The layer on top leaves room for it.
+inline constexpr double kVoxelLift = 1e-4;
 
 /// Edge of the cubes.
 double voxel_edge_um(const Params& params);

@@ -3,16 +3,14 @@
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
-#include <hwy/targets.h>
 #include <map>
-#include <set>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include "engine/space/overlap_kernel.hpp"
 #include "tests/support/runs.hpp"
+#include "tests/support/targets.hpp"
 
 namespace colony {
 namespace {
@@ -149,20 +147,9 @@ TEST(Digests, DoNotDependOnTheVectorWidth) {
   const std::vector<RunSpec> specs = {testing::spec_of(9, 30), testing::spec_of(9, 60, *preset("tumour"))};
   std::vector<std::string> expected;
   for (const RunSpec& spec : specs) expected.push_back(digest_of(spec));
-  std::set<std::string> names;  // several bits may fall back to one target
-  for (std::int64_t bit = 1; bit > 0 && bit <= hwy::SupportedTargets(); bit <<= 1) {
-    if ((hwy::SupportedTargets() & bit) == 0) continue;
-    hwy::SetSupportedTargetsForTest(bit);
-    hwy::GetChosenTarget().DeInit();
-    const std::string name = kernel::vector_target();
-    if (names.insert(name).second) {
-      for (std::size_t i = 0; i < specs.size(); ++i) EXPECT_EQ(digest_of(specs[i]), expected[i]) << name << ", scene " << i;
-    }
-    hwy::SetSupportedTargetsForTest(0);
-    hwy::GetChosenTarget().DeInit();
-  }
-  for (const std::string& name : names) std::printf("compared %s\n", name.c_str());
-  EXPECT_GE(names.size(), 2U);
+  testing::on_every_target([&](const std::string& name) {
+    for (std::size_t i = 0; i < specs.size(); ++i) EXPECT_EQ(digest_of(specs[i]), expected[i]) << name << ", scene " << i;
+  });
 }
 
 TEST(Digests, DifferBySeed) {

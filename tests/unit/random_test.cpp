@@ -3,6 +3,7 @@
 #include <bit>
 #include <map>
 #include <set>
+#include <span>
 #include <vector>
 
 #include <boost/random/sobol.hpp>
@@ -161,9 +162,10 @@ TEST(OwenScrambling, DiffersBySeedAndFillsTheInterval) {
   EXPECT_LT(testing::chi_square_uniform(counts), testing::chi_square_bound(15));
 }
 
-std::vector<std::uint32_t> column(const std::vector<float>& values) {
+// The first n: point sets are padded.
+std::vector<std::uint32_t> column(const std::vector<float>& values, std::size_t n) {
   std::vector<std::uint32_t> bits;
-  for (const float v : values) bits.push_back(static_cast<std::uint32_t>(v * 16777216.0F) << 8);
+  for (const float v : std::span(values).first(n)) bits.push_back(static_cast<std::uint32_t>(v * 16777216.0F) << 8);
   return bits;
 }
 
@@ -191,8 +193,8 @@ TEST(ScrambledSobol, EverySetIsANetInEachCoordinateAndStratifiedInPairsLikeTheUn
       PointSet points;
       Stream stream(14, CellId{set + 1}, 0, Purpose::kSearchPoints);
       scrambled_sobol(n, {stream.next_u32(), stream.next_u32(), stream.next_u32()}, points);
-      const std::array<std::vector<std::uint32_t>, 3> scrambled = {column(points.x), column(points.y),
-                                                                   column(points.z)};
+      const std::array<std::vector<std::uint32_t>, 3> scrambled = {column(points.x, n), column(points.y, n),
+                                                                   column(points.z, n)};
       for (std::size_t d = 0; d < 3; ++d) {
         std::set<std::uint32_t> intervals;
         for (const std::uint32_t bits : scrambled[d]) intervals.insert(bits >> (32 - m));

@@ -62,7 +62,7 @@ void check_woken(const RunSpec& spec, const Colony& before, const Colony& after,
 
 TEST(Waking, WakesExactlyTheSleepersNearAChangeThatGainedRoom) {
   for (const WakeRule rule : {WakeRule::kShare, WakeRule::kAlways}) {
-    RunSpec spec = testing::spec_of(4, testing::scaled(70, 200));
+    RunSpec spec = testing::spec_of(4, testing::scaled(400, 1000));
     spec.params.wake.rule = rule;
     const testing::Run run = testing::run(spec);
     Colony before(spec.params), after(spec.params);
@@ -139,7 +139,7 @@ TEST(Waking, AMoveWakesAsADivisionDoesAndTheMoverItself) {
 
 TEST(Waking, AlwaysCostsManyMoreSearchesThanShare) {
   const auto searches_per_division = [](WakeRule rule) {
-    RunSpec spec = testing::spec_of(6, 80);
+    RunSpec spec = testing::spec_of(6, 160);
     spec.params.wake.rule = rule;
     const testing::Run run = testing::run(spec);
     double searches = 0.0, divisions = 0.0;
@@ -150,7 +150,7 @@ TEST(Waking, AlwaysCostsManyMoreSearchesThanShare) {
     return searches / divisions;
   };
   const double share = searches_per_division(WakeRule::kShare), always = searches_per_division(WakeRule::kAlways);
-  std::printf("searches per division at 80 cells: share %.2f, always %.2f\n", share, always);
+  std::printf("searches per division at 160 cells: share %.2f, always %.2f\n", share, always);
   EXPECT_LT(share, 5.0);
   EXPECT_GT(always, 2.0 * share);
 }

@@ -33,8 +33,8 @@ export const thirdParty = [
   { prefix: 'xxhash.h', places: ['engine/base/'] },
   { prefix: 'Random123/', places: ['engine/random/'] },
   { prefix: 'xmmintrin.h', places: ['engine/base/'] },  // the floating-point mode
-  { prefix: 'hwy/', places: ['engine/space/'] },
-  { prefix: 'tbb/', places: ['engine/sim/'] },
+  { prefix: 'hwy/', places: ['engine/space/', 'engine/random/'] },
+  { prefix: 'tbb/', places: ['engine/sim/', 'engine/growth/search.*'] },
   { prefix: 'oneapi/', places: [] },  // the same library's other name: say tbb/
   { prefix: 'Eigen/', places: ['engine/'] },
   { prefix: 'curl/', places: ['client/'] },
