@@ -248,6 +248,9 @@ TEST(EstimateOfAJob, StaysWithinItsBoundsAndNamesItsBasis) {
   EXPECT_GT(of(R"({"until": {"cells": 100}, "preset": "young-colony"})").stored_bytes,
             of(R"({"until": {"cells": 100}})").stored_bytes)
       << "moves are stored";
+  const Estimate tumour = of(R"({"until": {"time_h": 726}, "preset": "tumour"})");
+  EXPECT_NEAR(static_cast<double>(tumour.cells), 5000.0, 1500.0) << "as grown: 5,000 cells at 726 h";
+  EXPECT_NE(tumour.basis.find("tumour"), std::string_view::npos);
 }
 
 }  // namespace
