@@ -10,6 +10,7 @@
 #include <tbb/task_arena.h>
 
 #include "engine/base/check.hpp"
+#include "engine/growth/support.hpp"
 #include "engine/space/overlap.hpp"
 
 namespace colony {
@@ -100,7 +101,8 @@ class Scorer {
     racing_ = best > 0.0;
   }
 
-  /// Scores every candidate without a score, on the points of the search. One that is given up gets a fitness below the best.
+  /// Scores every candidate without a score, on the points of the search. One that is given up gets a fitness below the best, one that
+  /// nothing holds up 0.
   void score_all(std::vector<Candidate>& candidates) {
     std::size_t count = 0;
     for (const Candidate& candidate : candidates) count += candidate.fitness < 0.0 ? 1 : 0;
@@ -128,7 +130,7 @@ class Scorer {
   }
 
   /// On the fresh points, by the definition.
-  double score_finally(const Pair& pair, bool& crosses_wall) {
+  double score_finally(const Pair& pair, bool& crosses_wall, bool& supported) {
     const std::array<std::uint32_t, 3> seeds = seeds_for(task_, Purpose::kFinalPoints, 0);
     const auto final_count = static_cast<std::uint32_t>(params_.search.points_final);
     const std::array<Body, 2> bodies = {Body(pair.bodies[0], params_.noise), Body(pair.bodies[1], params_.noise)};
@@ -139,6 +141,8 @@ class Scorer {
     }
     tiled_sobol(final_count, seeds, ws_.final_points);
     const double fitness = fitness_of(bodies, crosses_wall);
+    supported = params_.layers == Layers::kMono || is_supported(footings_, kSupportPercent);
+    if (!supported) return 0.0;
     if (fitness > 0.0 && params_.contact.neighbour_retained_min > 0.0) {
       // Neighbours are judged on fresh points too.
       tiled_sobol(static_cast<std::uint32_t>(params_.search.points_final), seeds_for(task_, Purpose::kRetained, 1), ws_.retained_points);
@@ -148,7 +152,7 @@ class Scorer {
   }
 
  private:
-  // Of a pair, on ws_.final_points.
+  // Of a pair, on ws_.final_points. Also fills footings_.
   double fitness_of(const std::array<Body, 2>& bodies, bool& crosses_wall) {
     double fitness = 1.0;
     crosses_wall = false;
@@ -162,6 +166,9 @@ class Scorer {
       count_overlaps(bodies[k], ws_.near, params_.dish.radius_um, ws_.final_points, ws_.overlap, ws_.counts);
       fitness = std::min(fitness, ws_.counts.fitness());
       crosses_wall = crosses_wall || ws_.counts.outside_wall_count > 0;
+      const std::vector<std::uint32_t>& shared = ws_.counts.shared_counts;  // the sibling's first
+      const auto most = std::max_element(shared.begin() + 1, shared.end());
+      footings_[k] = {reaches_dish(bodies[k]), ws_.counts.hit_count, most == shared.end() ? 0 : *most, shared.front()};
     }
     return fitness;
   }
@@ -184,10 +191,23 @@ class Scorer {
       if (score.hits[k] == 0 && score.dropped) continue;  // not looked at
       fitness = std::min(fitness, share_left(score.hits[k], score.shared[k]));
     }
-    if (score.dropped || !(fitness > 0.0) || !(params_.contact.neighbour_retained_min > 0.0)) return fitness;
+    if (score.dropped || !(fitness > 0.0)) return fitness;
+    if (params_.layers == Layers::kMulti &&
+        !is_supported({footing(score, candidate, 0), footing(score, candidate, 1)}, kSupportPercentInSearch)) {
+      return 0.0;
+    }
+    if (!(params_.contact.neighbour_retained_min > 0.0)) return fitness;
     const Pair pair = decode(chromosome, task_.frame, params_);
     const std::array<Body, 2> bodies = {Body(pair.bodies[0], params_.noise), Body(pair.bodies[1], params_.noise)};
     return neighbours_keep_enough(bodies) ? fitness : 0.0;
+  }
+
+  // The voxels know how many older cells hold a point, not which: in the search they hold a body up together.
+  Footing footing(const kernel::PairScore& score, const std::array<kernel::CandidateBody, 2>& candidate, std::size_t k) const {
+    const float* up = candidate[k].axes + 6;
+    const float height = candidate[k].centre[2] - ws_.scene.dish_z;
+    const bool on_dish = height <= std::sqrt((up[0] * up[0] + up[1] * up[1]) + up[2] * up[2]);
+    return {on_dish, score.hits[k], score.shared[k] - score.sibling[k], score.sibling[k]};
   }
 
   // Puts into the voxels every neighbour that a body of this reach can meet.
@@ -218,6 +238,7 @@ class Scorer {
   const SearchTask& task_;
   Workspace& ws_;
   bool racing_ = false;
+  std::array<Footing, 2> footings_;
   std::size_t covered_ = 0;   // of by_gap: those in the voxels
 };
 
@@ -237,7 +258,7 @@ class Search {
     SearchResult result;
     result.pair = decode(best_.chromosome, task_.frame, params_);
     result.search_fitness = best_.fitness;
-    result.fitness = scorer_.score_finally(result.pair, result.crosses_wall);
+    result.fitness = scorer_.score_finally(result.pair, result.crosses_wall, result.supported);
     result.evaluation_count = evaluation_count_;
     result.corrected = corrected_;
     result.work = {1, evaluation_count_, ws_.overlap.work.field_count, ws_.overlap.work.noise_count};
@@ -271,6 +292,10 @@ class Search {
     Stream first = stream(0);
     for (std::size_t i = 0; i < population_size_; ++i) population.push_back({random_chromosome(gene_count_, bits(), first), kUnscored});
     population[0].chromosome.set_code(kTurn, code_of(0.5, bits(), params_.search.coding));  // the unturned plane
+    // With layers, both on the dish: where nobody else is near, one population in ten has no other supported pair to breed from.
+    for (int gene = kFirstHeight; gene < gene_count_; ++gene) {
+      population[0].chromosome.set_code(gene, code_of(0.0, bits(), params_.search.coding));
+    }
     evaluate(population, 0);
     hopeless_ = is_hopeless(0);
     for (std::int64_t generation = 1; generation <= params_.search.generations && !good() && !hopeless_; ++generation) {

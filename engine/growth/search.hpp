@@ -35,6 +35,7 @@ struct SearchResult {
   std::uint32_t evaluation_count = 0;
   bool corrected = false;
   bool crosses_wall = false;    // the winner reaches beyond the dish (on the fresh points): nothing better was found
+  bool supported = true;        // with several layers, on the fresh points (support.hpp); if not, the fitness is 0
   Work work;
 };
 

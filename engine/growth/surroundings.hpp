@@ -29,8 +29,8 @@ struct BodyChange {
 double free_share(const Colony& colony, const Params& params, Seed seed, const Cell& cell, std::uint32_t ordinal,
                   const BodyChange& change);
 
-/// The sleeping cells (passive, nothing due) with a changed body within free_radius_um of their centre (horizontal distance to its
-/// box), except `change.gone`, whose surroundings gained room by wake.gain (rule `share`) or at all events (rule `always`). Ascending.
+/// The sleeping cells (passive, nothing due) with a changed body within free_radius_um of their centre (distance to its box, in the plane
+/// or, with layers, in space), except `change.gone`, whose surroundings gained room by wake.gain (rule `share`) or at all events (rule `always`). Ascending.
 std::vector<Woken> wake_sleepers(const Colony& colony, const Params& params, Seed seed, double time_h, const BodyChange& change);
 
 }  // namespace colony

@@ -141,7 +141,7 @@ struct ParamInfo {
 /// All parameters, in the order of the documentation.
 std::span<const ParamInfo> param_table();
 
-/// "paper", "young-colony", "clonogenic"; those that need what this version does not simulate are absent.
+/// "paper", "young-colony", "clonogenic", "tumour".
 std::span<const std::string_view> preset_names();
 /// One line about a preset, for people.
 std::string_view preset_text(std::string_view name);

@@ -31,6 +31,7 @@ enum class Purpose : std::uint8_t {
   kMove = 15,            // of a move: guided or not, and the direction
   kMoveSurroundings = 16,  // scrambling of the disc in which a move looks for the freer half
   kMovePoints = 17,      // scrambling of the points on which a moved body is scored
+  kSplitPerpendicular = 18,  // several layers: which of the planes through nucleus centre and nearest membrane point
 };
 
 class Stream {

@@ -1,6 +1,7 @@
 #include "engine/sim/decide.hpp"
 
 #include <array>
+#include <cmath>
 #include <optional>
 #include <vector>
 
@@ -46,16 +47,28 @@ bool is_isolated(const Colony& colony, Seed seed, const Cell& cell, Workspace& w
   return true;
 }
 
-Vec3 random_direction(Seed seed, const Cell& cell) {
+// Uniform on the circle of horizontal directions; with several layers, on the sphere.
+Vec3 random_direction(Seed seed, const Cell& cell, Layers layers) {
   Stream stream(seed, cell.id, cell.ordinal, Purpose::kSplitDirection);
   const auto [s, c] = maths::sincos(2.0 * maths::kPi * stream.uniform());
-  return {c, s, 0.0};
+  if (layers == Layers::kMono) return {c, s, 0.0};
+  const double z = 2.0 * stream.uniform() - 1.0;  // Archimedes
+  const double across = std::sqrt(1.0 - z * z);
+  return {across * c, across * s, z};
 }
 
-Vec3 splitting_direction(const Colony& colony, Seed seed, const Cell& cell, Workspace& workspace) {
+Vec3 splitting_direction(const Colony& colony, Layers layers, Seed seed, const Cell& cell, Workspace& workspace) {
   CHECK(cell.nearest_membrane_um.has_value());  // settling comes before every division: validate() sees to it
-  if (is_isolated(colony, seed, cell, workspace)) return random_direction(seed, cell);
-  return splitting_normal(cell.nucleus_um, *cell.nearest_membrane_um).value_or(random_direction(seed, cell));
+  if (is_isolated(colony, seed, cell, workspace)) return random_direction(seed, cell, layers);
+  const Vec3 &c = cell.nucleus_um, &m = *cell.nearest_membrane_um;
+  std::optional<Vec3> normal;
+  if (layers == Layers::kMono) {
+    normal = splitting_normal(c, m);
+  } else {
+    Stream stream(seed, cell.id, cell.ordinal, Purpose::kSplitPerpendicular);
+    normal = splitting_normal(c, m, 2.0 * maths::kPi * stream.uniform());
+  }
+  return normal ? *normal : random_direction(seed, cell, layers);
 }
 
 Vec3 draw_noise_offset(const Params& params, Seed seed, const Cell& parent, std::uint32_t lane) {
@@ -113,13 +126,13 @@ Decision decide_division(const Colony& colony, const Params& params, Seed seed, 
   task.cell_id = id;
   task.ordinal = parent.ordinal;
   task.frame.pivot_um = parent.nucleus_um;
-  task.frame.direction = splitting_direction(colony, seed, parent, workspace);
+  task.frame.direction = splitting_direction(colony, params.layers, seed, parent, workspace);
   for (std::uint32_t lane = 0; lane < 2; ++lane) {
     task.frame.noise_offsets[lane] = draw_noise_offset(params, seed, parent, lane);
   }
   const SearchResult found = find_space(colony, params, task, workspace, stop);
-  // The dish's wall is hard also where inhibition is off.
-  if (found.crosses_wall || (params.division.inhibition && !(found.fitness >= params.contact.fitness_min))) {
+  // The dish's wall is hard also where inhibition is off, and nobody floats.
+  if (found.crosses_wall || !found.supported || (params.division.inhibition && !(found.fitness >= params.contact.fitness_min))) {
     return {inhibited(colony, params, seed, parent, time_h, found), found.work};
   }
 
@@ -164,7 +177,8 @@ Decision decide_settling(const Colony& colony, const Params& params, Seed seed, 
   event.due_h = cell.due_h;
   // Inside everywhere in the slab cannot happen for a body within its own box; then the centre stands for m: no plane is fixed.
   event.nearest_membrane_um =
-      nearest_membrane_um(body, neighbours, rule, event.nucleus_um, workspace.points, workspace.overlap).value_or(event.nucleus_um);
+      nearest_membrane_um(body, neighbours, rule, event.nucleus_um, workspace.points, workspace.overlap, params.layers)
+          .value_or(event.nucleus_um);
   return {event, {}};
 }
 

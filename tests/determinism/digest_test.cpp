@@ -60,6 +60,17 @@ std::map<std::string, RunSpec> scenes() {
   spec.params.dish.radius_um = 60.0;
   spec.until = {std::nullopt, 60.0};
   all["many-moves-8-founders-dish-60-h"] = spec;
+
+  all["tumour-seed-1-to-150-cells"] = testing::spec_of(1, 150, *preset("tumour"));
+
+  spec = testing::spec_of(8, 100'000, *preset("tumour"));
+  spec.params.founders.count = 6;
+  spec.params.founders.radius_um = 40.0;
+  spec.params.dish.radius_um = 55.0;
+  spec.params.contact.neighbour_retained_min = 0.2;
+  spec.params.wake.rule = WakeRule::kAlways;
+  spec.until = {std::nullopt, 36.0};
+  all["tumour-6-founders-dish-retained-always-36-h"] = spec;
   return all;
 }
 
@@ -120,10 +131,25 @@ TEST(Digests, DoNotDependOnTheWindowWithMovesEither) {
   }
 }
 
+TEST(Digests, DoNotDependOnTheWindowWithLayersEither) {
+  std::string expected;
+  for (const double window_h : {1.0, 0.01, 0.25, 2.0}) {
+    RunSpec spec = testing::spec_of(8, 80, *preset("tumour"));
+    spec.params.window_h = window_h;
+    ASSERT_TRUE(validate(spec.params).empty());
+    const std::string found = digest_of(spec);
+    if (expected.empty()) expected = found;
+    EXPECT_EQ(found, expected) << testing::name_of_run(spec) << " window " << window_h;
+  }
+}
+
 TEST(Digests, DoNotDependOnTheVectorWidth) {
-  const RunSpec spec = testing::spec_of(9, 30);
-  const std::string expected = digest_of(spec);
-  testing::on_every_target([&](const std::string& name) { EXPECT_EQ(digest_of(spec), expected) << name; });
+  const std::vector<RunSpec> specs = {testing::spec_of(9, 30), testing::spec_of(9, 60, *preset("tumour"))};
+  std::vector<std::string> expected;
+  for (const RunSpec& spec : specs) expected.push_back(digest_of(spec));
+  testing::on_every_target([&](const std::string& name) {
+    for (std::size_t i = 0; i < specs.size(); ++i) EXPECT_EQ(digest_of(specs[i]), expected[i]) << name << ", scene " << i;
+  });
 }
 
 TEST(Digests, DifferBySeed) {

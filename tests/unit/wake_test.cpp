@@ -40,7 +40,8 @@ void check_woken(const RunSpec& spec, const Colony& before, const Colony& after,
     const auto distance = [&](const Box& box) {
       const double dx = std::max({box.low.x() - cell.centre_um.x(), 0.0, cell.centre_um.x() - box.high.x()});
       const double dy = std::max({box.low.y() - cell.centre_um.y(), 0.0, cell.centre_um.y() - box.high.y()});
-      return std::sqrt(dx * dx + dy * dy);
+      const double dz = std::max({box.low.z() - cell.centre_um.z(), 0.0, cell.centre_um.z() - box.high.z()});
+      return std::sqrt(dx * dx + dy * dy + (spec.params.layers == Layers::kMulti ? dz * dz : 0.0));
     };
     const Cell& daughter = event.kind() == EventKind::kDivided ? after.cells().back() : after.cell(*event.cell_id);
     const bool near = std::min({distance(before.body(*event.cell_id).box()), distance(after.body(*event.cell_id).box()),
@@ -74,6 +75,25 @@ TEST(Waking, WakesExactlyTheSleepersNearAChangeThatGainedRoom) {
       before.apply(event);
     }
     std::printf("%s, gain %.3f: %d woken\n", rule == WakeRule::kShare ? "share" : "always", gain, woken);
+    EXPECT_GT(woken, rule == WakeRule::kShare ? 3 : 100);
+  }
+}
+
+TEST(Waking, WithLayersTheDistanceIsOneInSpace) {
+  for (const WakeRule rule : {WakeRule::kShare, WakeRule::kAlways}) {
+    RunSpec spec = testing::spec_of(4, testing::scaled(120, 300), *preset("tumour"));
+    spec.params.wake.rule = rule;
+    spec.params.wake.free_radius_um = 10.0;  // short of the top layer from the dish
+    spec.params.wake.free_min = 0.5;
+    const testing::Run run = testing::run(spec);
+    Colony before(spec.params), after(spec.params);
+    int woken = 0;
+    for (const Event& event : run.events) {
+      after.apply(event);
+      check_woken(spec, before, after, event, woken);
+      before.apply(event);
+    }
+    std::printf("layers, %s: %d woken\n", rule == WakeRule::kShare ? "share" : "always", woken);
     EXPECT_GT(woken, rule == WakeRule::kShare ? 3 : 100);
   }
 }
