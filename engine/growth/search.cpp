@@ -70,12 +70,12 @@ class Scorer {
       // Only the noise of this body counts: its place and shape are the candidate's.
       const Body noise_of({Vec3::Zero(), Vec3::Ones(), Vec3::Zero(), task.frame.noise_offsets[k]}, params.noise);
       ws_.candidate[k].field = kernel::FloatBody(noise_of, Vec3::Zero());
-      kernel::select_own_points(ws_.candidate[k].field, static_cast<float>(noise_of.noisy_scale()), ws_.points, scene.own[k]);
+      kernel::select_own_points(ws_.candidate[k].field, static_cast<float>(noise_of.noisy_scale()), ws_.points, scene.own[k],
+                                &ws_.overlap.work);
     }
     if (params.contact.neighbour_retained_min > 0.0) {
       tiled_sobol(static_cast<std::uint32_t>(params.search.points), seeds_for(task, Purpose::kRetained, 0), ws_.retained_points);
     }
-    ws_.overlap.work = {};
   }
 
   /// From here on a candidate is given up once it cannot beat `best` any more: after h hits, when more are shared than
@@ -142,7 +142,7 @@ class Scorer {
     // The margin is for rounding alone.
     for (; covered_ < ws_.by_gap.size() && ws_.by_gap[covered_].gap_um <= 1.0001F * reach_um + 0.001F; ++covered_) {
       const Workspace::Neighbour& other = ws_.by_gap[covered_];
-      ws_.voxels.add(ws_.rasters.of(other.id, *other.body, ws_.overlap.work.field_count));
+      ws_.voxels.add(ws_.rasters.of(other.id, *other.body, ws_.overlap.work));
     }
   }
 
@@ -187,7 +187,6 @@ class Search {
     result.fitness = scorer_.score_finally(result.pair, result.crosses_wall);
     result.evaluation_count = evaluation_count_;
     result.corrected = corrected_;
-    result.work = {1, evaluation_count_, ws_.overlap.work.field_count, ws_.overlap.work.noise_count};
     return result;
   }
 

@@ -34,10 +34,9 @@ struct SearchResult {
   std::uint32_t evaluation_count = 0;
   bool corrected = false;
   bool crosses_wall = false;    // the winner reaches beyond the dish (on the fresh points): nothing better was found
-  Work work;
 };
 
-/// `workspace` must be made from the same parameters. Throws Stopped when asked to (looked at before every generation).
+/// `workspace` must be made from the same parameters; its overlap.work grows by what the search takes. Throws Stopped when asked to (looked at before every generation).
 SearchResult find_space(const Colony& colony, const Params& params, const SearchTask& task, Workspace& workspace,
                         StopFlag stop = nullptr);
 /// The same with a workspace of its own.
