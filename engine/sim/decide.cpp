@@ -6,7 +6,6 @@
 
 #include "engine/base/check.hpp"
 #include "engine/base/maths.hpp"
-#include "engine/growth/search.hpp"
 #include "engine/growth/splitting.hpp"
 #include "engine/growth/surroundings.hpp"
 #include "engine/model/cycle.hpp"
@@ -103,13 +102,8 @@ Inhibited inhibited(const Colony& colony, const Params& params, Seed seed, const
 
 }  // namespace
 
-Decision decide_division(const Colony& colony, const Params& params, Seed seed, CellId id, double time_h, Workspace& workspace,
-                         StopFlag stop) {
+SearchTask search_task(const Colony& colony, const Params& params, Seed seed, CellId id, Workspace& workspace) {
   const Cell& parent = colony.cell(id);
-  if (params.division.generation_limit && parent.generation >= *params.division.generation_limit) return {Senesced{}, {}};
-
-  kernel::CountWork& counted = workspace.overlap.work;
-  counted = {};
   SearchTask task;
   task.seed = seed;
   task.cell_id = id;
@@ -119,6 +113,17 @@ Decision decide_division(const Colony& colony, const Params& params, Seed seed, 
   for (std::uint32_t lane = 0; lane < 2; ++lane) {
     task.frame.noise_offsets[lane] = draw_noise_offset(params, seed, parent, lane);
   }
+  return task;
+}
+
+Decision decide_division(const Colony& colony, const Params& params, Seed seed, CellId id, double time_h, Workspace& workspace,
+                         StopFlag stop) {
+  const Cell& parent = colony.cell(id);
+  if (params.division.generation_limit && parent.generation >= *params.division.generation_limit) return {Senesced{}, {}};
+
+  kernel::CountWork& counted = workspace.overlap.work;
+  counted = {};
+  const SearchTask task = search_task(colony, params, seed, id, workspace);
   const SearchResult found = find_space(colony, params, task, workspace, stop);
   // The dish's wall is hard also where inhibition is off.
   if (found.crosses_wall || (params.division.inhibition && !(found.fitness >= params.contact.fitness_min))) {
