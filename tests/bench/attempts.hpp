@@ -1,4 +1,5 @@
-// attempts: the division attempts of growing colonies, as the simulator sees them, for comparing searches on what they really meet.
+// attempts: the division attempts of growing colonies, as the simulator sees them, for comparing searches on what they
+// really meet.
 // Threads: pure.
 #pragma once
 

@@ -13,7 +13,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 std::size_t multiply_add_kernel(std::size_t rounds, float* sink) {
   const hn::ScalableTag<float> d;
-  const auto factor = hn::Set(d, sink[0]);      // read, so that the compiler cannot know it
+  const auto factor = hn::Set(d, sink[0]);  // read, so that the compiler cannot know it
   const auto summand = hn::Set(d, sink[1]);
   auto a = factor, b = summand, c = factor, e = summand, f = factor, g = summand, h = factor, i = summand;
   for (std::size_t k = 0; k < rounds; ++k) {
@@ -39,7 +39,9 @@ namespace colony::bench {
 
 HWY_EXPORT(multiply_add_kernel);
 
-std::size_t multiply_add(std::size_t rounds, float* sink) { return HWY_DYNAMIC_DISPATCH(multiply_add_kernel)(rounds, sink); }
+std::size_t multiply_add(std::size_t rounds, float* sink) {
+  return HWY_DYNAMIC_DISPATCH(multiply_add_kernel)(rounds, sink);
+}
 
 }  // namespace colony::bench
 #endif

@@ -1,11 +1,8 @@
-// colony-bench: grows the scenes that speed is judged by and prints one CSV line for each scene, thread count and vector target, the
-// digest beside the figures: a faster wrong run is seen, and fails. Every run is a process of its own, so that its peak memory is its own.
+// colony-bench: grows the scenes that speed is judged by and prints one CSV line for each scene, thread count and
+// vector target, the digest beside the figures: a faster wrong run is seen, and fails. Every run is a process of its
+// own, so that its peak memory is its own.
 // Usage:  colony-bench [--threads 1,2] [--targets best|all|NAME,...] [--repeat N] [scene ...]     see --help
 // Exit:   0; 1 a run failed, or the digest of a scene is not the same everywhere; 2 usage.
-#include <sys/resource.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <charconv>
 #include <chrono>
@@ -15,6 +12,9 @@
 #include <map>
 #include <string>
 #include <string_view>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 #include <vector>
 
 #include "engine/analysis/series.hpp"
@@ -32,7 +32,7 @@ constexpr int kRepeatMax = 100;
 struct Options {
   std::vector<const Scene*> scenes;
   std::vector<int> threads = {1};
-  std::vector<std::int64_t> targets;           // Highway's bits; 0: the best
+  std::vector<std::int64_t> targets;  // Highway's bits; 0: the best
   int repeat = 1;
 };
 
@@ -54,7 +54,7 @@ double cpu_s() {
 }
 
 void choose_target(std::int64_t bit) {
-  hwy::SetSupportedTargetsForTest(bit);        // 0: all
+  hwy::SetSupportedTargetsForTest(bit);  // 0: all
   hwy::GetChosenTarget().DeInit();
 }
 
@@ -84,7 +84,9 @@ Row run(const Scene& scene, const RunSpec& spec, int threads, std::int64_t targe
   Row row;
   const bool terminal = isatty(STDERR_FILENO) != 0;
   const auto start = std::chrono::steady_clock::now();
-  const auto elapsed_s = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(); };
+  const auto elapsed_s = [&] {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  };
   Simulator simulator(spec, nullptr, threads);
   double shown_s = 2.0;
   while (const std::optional<Event> event = simulator.step()) {
@@ -101,7 +103,7 @@ Row run(const Scene& scene, const RunSpec& spec, int threads, std::int64_t targe
   const Colony& colony = simulator.colony();
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
-  row.peak_mib = static_cast<double>(usage.ru_maxrss) / 1024.0;    // before the area is measured
+  row.peak_mib = static_cast<double>(usage.ru_maxrss) / 1024.0;  // before the area is measured
   row.cells = colony.cells().size();
   row.active = static_cast<double>(colony.count(Activity::kActive)) / static_cast<double>(row.cells);
   row.time_h = colony.time_h();
@@ -149,18 +151,23 @@ double per(double n, double d) { return d > 0.0 ? n / d : 0.0; }
 
 void print(const Scene& scene, int threads, const std::string& which, const Row& r) {
   const auto n = [](std::uint64_t count) { return static_cast<double>(count); };
-  std::printf("%s,%d,%s,%s,%llu,%.1f,%.3f,%.3f,%.1f,%.1f,%.3f,%.1f,%.0f,%.0f,%.0f,%.3f,%.2f,%.1f,%.3f,%.0f,%.1f,%.1f,%s\n", std::string(scene.name).c_str(),
-              threads, r.target, which.c_str(), static_cast<unsigned long long>(r.cells), r.time_h, r.wall_s, r.cpu_s, per(n(r.cells), r.wall_s),
-              per(n(r.divisions), r.wall_s), per(n(r.work.search_count), n(r.divisions)), per(n(r.work.candidate_count), n(r.divisions)),
-              per(n(r.work.field_count), n(r.divisions)), per(n(r.work.lookup_count), n(r.divisions)), per(n(r.work.cover_count), n(r.divisions)),
-              per(n(r.work.noise_count), n(r.work.field_count)), per(1e9 * r.cpu_s, n(r.work.field_count)), per(r.area_um2, n(r.cells)), r.active,
-              per(r.bytes, n(r.cells)), r.peak_mib, per(n(r.ready + r.freed), n(r.rounds)), r.digest);
+  std::printf(
+      "%s,%d,%s,%s,%llu,%.1f,%.3f,%.3f,%.1f,%.1f,%.3f,%.1f,%.0f,%.0f,%.0f,%.3f,%.2f,%.1f,%.3f,%.0f,%.1f,%.1f,%s\n",
+      std::string(scene.name).c_str(), threads, r.target, which.c_str(), static_cast<unsigned long long>(r.cells),
+      r.time_h, r.wall_s, r.cpu_s, per(n(r.cells), r.wall_s), per(n(r.divisions), r.wall_s),
+      per(n(r.work.search_count), n(r.divisions)), per(n(r.work.candidate_count), n(r.divisions)),
+      per(n(r.work.field_count), n(r.divisions)), per(n(r.work.lookup_count), n(r.divisions)),
+      per(n(r.work.cover_count), n(r.divisions)), per(n(r.work.noise_count), n(r.work.field_count)),
+      per(1e9 * r.cpu_s, n(r.work.field_count)), per(r.area_um2, n(r.cells)), r.active, per(r.bytes, n(r.cells)),
+      r.peak_mib, per(n(r.ready + r.freed), n(r.rounds)), r.digest);
   std::fflush(stdout);
 }
 
 constexpr const char* kHeader =
-    "scene,threads,vector_target,run,cells,time_h,wall_s,cpu_s,cells_per_s,divisions_per_s,searches_per_division,candidates_per_division,"
-    "field_evaluations_per_division,lookups_per_division,covers_per_division,band_share,ns_per_evaluation,area_per_cell_um2,active_share,"
+    "scene,threads,vector_target,run,cells,time_h,wall_s,cpu_s,cells_per_s,divisions_per_s,searches_per_division,"
+    "candidates_per_division,"
+    "field_evaluations_per_division,lookups_per_division,covers_per_division,band_share,ns_per_evaluation,area_per_"
+    "cell_um2,active_share,"
     "bytes_per_cell,peak_memory_mib,decisions_per_round,digest";
 
 double median(std::vector<double> values) {
@@ -175,7 +182,8 @@ bool measure(const Options& options) {
   for (const Scene* scene : options.scenes) {
     const std::optional<RunSpec> spec = scene->make();
     if (!spec) {
-      std::fprintf(stderr, "colony-bench: %s left out: this version has not the preset it needs\n", std::string(scene->name).c_str());
+      std::fprintf(stderr, "colony-bench: %s left out: this version has not the preset it needs\n",
+                   std::string(scene->name).c_str());
       continue;
     }
     std::string digest;
@@ -196,7 +204,8 @@ bool measure(const Options& options) {
             good = false;
           }
           if (row.cells < *spec->until.cells) {
-            std::fprintf(stderr, "colony-bench: %s ended at %llu cells\n", std::string(scene->name).c_str(), static_cast<unsigned long long>(row.cells));
+            std::fprintf(stderr, "colony-bench: %s ended at %llu cells\n", std::string(scene->name).c_str(),
+                         static_cast<unsigned long long>(row.cells));
             good = false;
           }
           wall_s.push_back(row.wall_s);
@@ -215,8 +224,10 @@ bool measure(const Options& options) {
 std::vector<std::string> split(std::string_view list) {
   std::vector<std::string> parts(1);
   for (const char c : list) {
-    if (c == ',') parts.emplace_back();
-    else parts.back() += c;
+    if (c == ',')
+      parts.emplace_back();
+    else
+      parts.back() += c;
   }
   return parts;
 }
@@ -232,16 +243,20 @@ int refuse(const std::string& what) {
 }
 
 void print_scenes() {
-  for (const Scene& scene : bench::scenes()) std::printf("  %-13s %s\n", std::string(scene.name).c_str(), std::string(scene.text).c_str());
+  for (const Scene& scene : bench::scenes())
+    std::printf("  %-13s %s\n", std::string(scene.name).c_str(), std::string(scene.text).c_str());
 }
 
 void print_help() {
-  std::printf("colony-bench [options] [scene ...]    one CSV line for each scene x threads x vector target; no scene: those up to paper-10k\n"
-              "  --threads LIST    e.g. 1,2: threads that decide; default 1\n"
-              "  --targets LIST    best (default), all, or names of this machine's vector targets\n"
-              "  --repeat N        N runs of each, then a line with the medians of wall_s and cpu_s\n"
-              "  --list, --help\n"
-              "What is counted as an evaluation: engine/growth/workspace.hpp. ns_per_evaluation is all CPU time over field evaluations.\nscenes:\n");
+  std::printf(
+      "colony-bench [options] [scene ...]    one CSV line for each scene x threads x vector target; no scene: those up "
+      "to paper-10k\n"
+      "  --threads LIST    e.g. 1,2: threads that decide; default 1\n"
+      "  --targets LIST    best (default), all, or names of this machine's vector targets\n"
+      "  --repeat N        N runs of each, then a line with the medians of wall_s and cpu_s\n"
+      "  --list, --help\n"
+      "What is counted as an evaluation: engine/growth/workspace.hpp. ns_per_evaluation is all CPU time over field "
+      "evaluations.\nscenes:\n");
   print_scenes();
 }
 
@@ -263,7 +278,8 @@ int parse(const std::vector<std::string>& arguments, Options& options) {
           options.threads.push_back(threads);
         }
       } else if (argument == "--repeat") {
-        if (!number(value, kRepeatMax, options.repeat)) return refuse("--repeat: \"" + value + "\" is not within 1 to 100");
+        if (!number(value, kRepeatMax, options.repeat))
+          return refuse("--repeat: \"" + value + "\" is not within 1 to 100");
       } else if (argument == "--targets") {
         targets = value;
       } else {

@@ -1,7 +1,7 @@
-// colony-kernels: what the pieces of a decision cost, on a real search of a colony of 300 cells, beside the machine's ceiling.
+// colony-kernels: what the pieces of a decision cost, on a real search of a colony of 300 cells, beside the machine's
+// ceiling.
 // Usage:  colony-kernels [Google Benchmark's options]. `per_item`: CPU time a point (or cube, pair, ...), see each label.
 #include <benchmark/benchmark.h>
-
 #include <cmath>
 
 #include "engine/growth/search.hpp"
@@ -76,7 +76,7 @@ void field(benchmark::State& state, bool noisy) {
   const PointSet unit = testing::points(65536, 3);
   std::vector<float> x, y, z;
   for (std::size_t i = 0; i < unit.size() && x.size() < 4096; ++i) {
-    const Vec3 q(3.0 * unit.x[i] - 1.5, 3.0 * unit.y[i] - 1.5, 3.0 * unit.z[i] - 1.5);   // in semiaxes
+    const Vec3 q(3.0 * unit.x[i] - 1.5, 3.0 * unit.y[i] - 1.5, 3.0 * unit.z[i] - 1.5);  // in semiaxes
     const double smooth = 1.0 - q.squaredNorm();
     if (noisy ? std::abs(smooth) > 0.9 * body.noise_bound() : smooth > -1.1 * body.noise_bound()) continue;
     const Vec3 p = body.to_unit().inverse() * q;
@@ -123,7 +123,8 @@ BENCHMARK(decode);
 void raster(benchmark::State& state) {
   kernel::CountWork work;
   Raster out;
-  for (auto _ : state) make_raster(grown().colony().body(CellId{150}), searched().workspace.voxels.edge_um(), out, &work);
+  for (auto _ : state)
+    make_raster(grown().colony().body(CellId{150}), searched().workspace.voxels.edge_um(), out, &work);
   items(state, static_cast<double>(work.field_count), "cube");
 }
 BENCHMARK(raster);
@@ -160,7 +161,8 @@ void flag_deformed(benchmark::State& state) {
   OverlapScratch scratch;
   PointSet points;
   tiled_sobol(4096, {1, 2, 3}, points);
-  for (auto _ : state) benchmark::DoNotOptimize(deformed_mass(colony.body(CellId{150}), near, ContactRule::kSum, points, scratch));
+  for (auto _ : state)
+    benchmark::DoNotOptimize(deformed_mass(colony.body(CellId{150}), near, ContactRule::kSum, points, scratch));
   items(state, static_cast<double>(scratch.work.field_count), "evaluation");
 }
 BENCHMARK(flag_deformed);

@@ -1,6 +1,6 @@
-// colony_means: what a lone colony is like at fixed times, over seeds: the figures by which two engines are held against each other.
-// Written against what the engine has had since results version 1, so that it compiles against that engine too
-// (tests/bench/evidence_reference.cpp says how its figures were made).
+// colony_means: what a lone colony is like at fixed times, over seeds: the figures by which two engines are held
+// against each other. Written against what the engine has had since results version 1, so that it compiles against that
+// engine too (tests/bench/evidence_reference.cpp says how its figures were made).
 // Units:   h, um2, um3.        Threads: pure.
 #pragma once
 
@@ -16,7 +16,8 @@
 namespace colony::bench {
 
 inline constexpr std::array<double, 3> kMeanTimes_h = {100.0, 200.0, 300.0};
-inline constexpr std::array<const char*, 4> kQuantityNames = {"cells", "mean volume, um3", "active share", "area per cell, um2"};
+inline constexpr std::array<const char*, 4> kQuantityNames = {"cells", "mean volume, um3", "active share",
+                                                              "area per cell, um2"};
 inline constexpr std::size_t kQuantityCount = kQuantityNames.size();
 
 /// values[time][quantity] of one colony, and what its history took up to the last time.
@@ -42,7 +43,8 @@ inline ColonyMeans colony_means(Seed seed, const Params& params) {
   };
   // A colony is as its last event left it, so it must be measured before an event past the time is applied: ask the agenda.
   while (true) {
-    if (simulator.colony().last_seq() > 0 && !simulator.agenda().empty()) measure_until(simulator.agenda().first().due_h);
+    if (simulator.colony().last_seq() > 0 && !simulator.agenda().empty())
+      measure_until(simulator.agenda().first().due_h);
     const std::optional<Event> event = simulator.step();
     if (!event) break;
     if (std::holds_alternative<Divided>(event->body)) ++means.divided_count;

@@ -41,10 +41,10 @@ inline std::string text_of(const testing::Mean& mean, int digits) {
   return text;
 }
 
-void print_volume_error(const EvidenceSize& size);        // a
-void print_searches(const EvidenceSize& size);            // b to f, j: on real attempts
-void print_colony_terms(const EvidenceSize& size);        // c, d, f, h, j: what they earn a colony
-void print_contact(const EvidenceSize& size);             // g, i
-void print_reference(const EvidenceSize& size);           // k
+void print_volume_error(const EvidenceSize& size);  // a
+void print_searches(const EvidenceSize& size);      // b to f, j: on real attempts
+void print_colony_terms(const EvidenceSize& size);  // c, d, f, h, j: what they earn a colony
+void print_contact(const EvidenceSize& size);       // g, i
+void print_reference(const EvidenceSize& size);     // k
 
 }  // namespace colony::bench

@@ -27,18 +27,21 @@ constexpr Variant kVariants[] = {
 
 std::vector<ColonyMeans> grow(int seed_count, const Params& params) {
   std::vector<ColonyMeans> colonies(static_cast<std::size_t>(seed_count));
-  for_each_slot(seed_count, [&](int k) { colonies[static_cast<std::size_t>(k)] = colony_means(static_cast<Seed>(1 + k), params); });
+  for_each_slot(seed_count,
+                [&](int k) { colonies[static_cast<std::size_t>(k)] = colony_means(static_cast<Seed>(1 + k), params); });
   return colonies;
 }
 
-testing::Mean mean_over(const std::vector<ColonyMeans>& colonies, const std::function<double(const ColonyMeans&)>& value) {
+testing::Mean mean_over(const std::vector<ColonyMeans>& colonies,
+                        const std::function<double(const ColonyMeans&)>& value) {
   std::vector<double> values;
   for (const ColonyMeans& colony : colonies) values.push_back(value(colony));
   return testing::mean_of(values);
 }
 
-// The engine of results version 1 (commit ea23149, the last before the search was rewritten), preset paper, seeds 1 to 123, by
-// colony_means() of this tree compiled against that one's library: [time][quantity] as kMeanTimes_h and kQuantityNames.
+// The engine of results version 1 (commit ea23149, the last before the search was rewritten), preset paper, seeds 1 to
+// 123, by colony_means() of this tree compiled against that one's library: [time][quantity] as kMeanTimes_h and
+// kQuantityNames.
 constexpr int kReferenceSeeds = 123;
 constexpr testing::Mean kReference[kMeanTimes_h.size()][kQuantityCount] = {
     {{49.5772, 0.4987}, {475.226, 3.292}, {0.419744, 0.005033}, {106.558, 0.4227}},
@@ -51,8 +54,10 @@ constexpr testing::Mean kReference[kMeanTimes_h.size()][kQuantityCount] = {
 void print_colony_terms(const EvidenceSize& size) {
   const int seed_count = size.of(8, 40);
   std::printf("\nWhat choices earn a colony: preset paper otherwise, %d seeds, to 300 h\n\n", seed_count);
-  std::printf("| variant | cells at 100 h | at 200 h | at 300 h | searches per division | mean volume at 300 h, um3 | area per cell, um2 |\n"
-              "| --- | --- | --- | --- | --- | --- | --- |\n");
+  std::printf(
+      "| variant | cells at 100 h | at 200 h | at 300 h | searches per division | mean volume at 300 h, um3 | area per "
+      "cell, um2 |\n"
+      "| --- | --- | --- | --- | --- | --- | --- |\n");
   for (const Variant& variant : kVariants) {
     Params params;
     variant.change(params);
@@ -63,8 +68,9 @@ void print_colony_terms(const EvidenceSize& size) {
     const testing::Mean searches = mean_over(colonies, [](const ColonyMeans& c) {
       return static_cast<double>(c.divided_count + c.inhibited_count) / static_cast<double>(c.divided_count);
     });
-    std::printf("| %s | %s | %s | %s | %s | %s | %s |\n", variant.name, text_of(at(0, 0), 1).c_str(), text_of(at(1, 0), 1).c_str(),
-                text_of(at(2, 0), 1).c_str(), text_of(searches, 2).c_str(), text_of(at(2, 1), 0).c_str(), text_of(at(2, 3), 1).c_str());
+    std::printf("| %s | %s | %s | %s | %s | %s | %s |\n", variant.name, text_of(at(0, 0), 1).c_str(),
+                text_of(at(1, 0), 1).c_str(), text_of(at(2, 0), 1).c_str(), text_of(searches, 2).c_str(),
+                text_of(at(2, 1), 0).c_str(), text_of(at(2, 3), 1).c_str());
     std::fflush(stdout);
   }
 }
@@ -72,18 +78,22 @@ void print_colony_terms(const EvidenceSize& size) {
 void print_reference(const EvidenceSize& size) {
   const int seed_count = size.of(20, 200);
   const std::vector<ColonyMeans> colonies = grow(seed_count, Params());
-  std::printf("\nThis engine (%d seeds) against results version 1 (%d seeds), preset paper; z = difference over its standard error\n\n", seed_count,
-              kReferenceSeeds);
-  std::printf("| h | quantity | version 1 | this engine | difference | in %% | z |\n| --- | --- | --- | --- | --- | --- | --- |\n");
+  std::printf(
+      "\nThis engine (%d seeds) against results version 1 (%d seeds), preset paper; z = difference over its standard "
+      "error\n\n",
+      seed_count, kReferenceSeeds);
+  std::printf(
+      "| h | quantity | version 1 | this engine | difference | in %% | z |\n| --- | --- | --- | --- | --- | --- | --- "
+      "|\n");
   for (std::size_t time = 0; time < kMeanTimes_h.size(); ++time) {
     for (std::size_t quantity = 0; quantity < kQuantityCount; ++quantity) {
       const testing::Mean& before = kReference[time][quantity];
       const testing::Mean now = mean_over(colonies, [&](const ColonyMeans& c) { return c.values[time][quantity]; });
       const testing::Mean difference = {now.value - before.value, std::sqrt(now.se * now.se + before.se * before.se)};
       const int digits = quantity == 2 ? 4 : 2;
-      std::printf("| %.0f | %s | %s | %s | %s | %.1f | %.1f |\n", kMeanTimes_h[time], kQuantityNames[quantity], text_of(before, digits).c_str(),
-                  text_of(now, digits).c_str(), text_of(difference, digits).c_str(), 100.0 * difference.value / before.value,
-                  difference.value / difference.se);
+      std::printf("| %.0f | %s | %s | %s | %s | %.1f | %.1f |\n", kMeanTimes_h[time], kQuantityNames[quantity],
+                  text_of(before, digits).c_str(), text_of(now, digits).c_str(), text_of(difference, digits).c_str(),
+                  100.0 * difference.value / before.value, difference.value / difference.se);
     }
   }
 }

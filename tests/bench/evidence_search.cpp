@@ -13,8 +13,8 @@ struct Variant {
   void (*change)(Params&);
 };
 
-// The default first: the others are compared with it, attempt by attempt. `whole`: no search is given up nor ends early, so that all
-// spend the same number of candidates.
+// The default first: the others are compared with it, attempt by attempt. `whole`: no search is given up nor ends
+// early, so that all spend the same number of candidates.
 constexpr Variant kWhole[] = {
     {"genetic (tournament, Gray, corrector)", [](Params&) {}},
     {"random", [](Params& p) { p.search.optimiser = Optimiser::kRandom; }},
@@ -73,7 +73,7 @@ void print_variants(const char* title, std::span<const Variant> variants, bool w
         [&](const Colony& colony, const SearchTask& asked) {
           if (++number % 3 != 0) return;
           SearchTask task = asked;
-          task.ordinal += 1'000'000;     // other draws than those that made this history
+          task.ordinal += 1'000'000;  // other draws than those that made this history
           for (std::size_t v = 0; v < variants.size(); ++v) {
             Workspace& workspace = workspaces[v];
             workspace.overlap.work = {};
@@ -91,7 +91,9 @@ void print_variants(const char* title, std::span<const Variant> variants, bool w
         [](const Event&) {});
   });
   std::vector<Sample> all(variants.size());
-  const auto append = [](std::vector<double>& to, const std::vector<double>& from) { to.insert(to.end(), from.begin(), from.end()); };
+  const auto append = [](std::vector<double>& to, const std::vector<double>& from) {
+    to.insert(to.end(), from.begin(), from.end());
+  };
   for (const std::vector<Sample>& samples : by_seed) {
     for (std::size_t v = 0; v < variants.size(); ++v) {
       append(all[v].fitness, samples[v].fitness);
@@ -102,20 +104,25 @@ void print_variants(const char* title, std::span<const Variant> variants, bool w
       append(all[v].cpu_us, samples[v].cpu_us);
     }
   }
-  std::printf("\n%s: %zu attempts of %d colonies to 250 h; fitness on 4,096 fresh points; differences attempt by attempt\n\n", title,
-              all[0].fitness.size(), seed_count);
-  std::printf("| search | fitness | less the first | accepted, %% | less the first | lost on fresh points | candidates | evaluations | CPU us |\n"
-              "| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n");
+  std::printf(
+      "\n%s: %zu attempts of %d colonies to 250 h; fitness on 4,096 fresh points; differences attempt by attempt\n\n",
+      title, all[0].fitness.size(), seed_count);
+  std::printf(
+      "| search | fitness | less the first | accepted, %% | less the first | lost on fresh points | candidates | "
+      "evaluations | CPU us |\n"
+      "| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n");
   for (std::size_t v = 0; v < variants.size(); ++v) {
     std::vector<double> fitness, accepted;
     for (std::size_t i = 0; i < all[v].fitness.size(); ++i) {
       fitness.push_back(all[v].fitness[i] - all[0].fitness[i]);
       accepted.push_back(100.0 * (all[v].accepted[i] - all[0].accepted[i]));
     }
-    std::printf("| %s | %.4f | %s | %.1f | %s | %.3f | %.0f | %.0f | %.0f |\n", variants[v].name, testing::mean_of(all[v].fitness).value,
-                v == 0 ? "" : text_of(testing::mean_of(fitness), 4).c_str(), 100.0 * testing::mean_of(all[v].accepted).value,
+    std::printf("| %s | %.4f | %s | %.1f | %s | %.3f | %.0f | %.0f | %.0f |\n", variants[v].name,
+                testing::mean_of(all[v].fitness).value, v == 0 ? "" : text_of(testing::mean_of(fitness), 4).c_str(),
+                100.0 * testing::mean_of(all[v].accepted).value,
                 v == 0 ? "" : text_of(testing::mean_of(accepted), 1).c_str(), testing::mean_of(all[v].bias).value,
-                testing::mean_of(all[v].candidates).value, testing::mean_of(all[v].evaluations).value, testing::mean_of(all[v].cpu_us).value);
+                testing::mean_of(all[v].candidates).value, testing::mean_of(all[v].evaluations).value,
+                testing::mean_of(all[v].cpu_us).value);
   }
 }
 

@@ -12,8 +12,8 @@ namespace colony::bench {
 
 struct Scene {
   std::string_view name;
-  std::string_view text;                     // one line, for people
-  std::optional<RunSpec> (*make)();          // none: a preset it needs is not in this version
+  std::string_view text;             // one line, for people
+  std::optional<RunSpec> (*make)();  // none: a preset it needs is not in this version
 };
 
 /// From the shortest to the longest.
