@@ -71,12 +71,12 @@ Scorer::Scorer(const Colony& colony, const Params& params, const SearchTask& tas
     // Only the noise of this body counts: its place and shape are the candidate's.
     const Body noise_of({Vec3::Zero(), Vec3::Ones(), Vec3::Zero(), task.frame.noise_offsets[k]}, params.noise);
     ws_.candidate[k].field = kernel::FloatBody(noise_of, Vec3::Zero());
-    kernel::select_own_points(ws_.candidate[k].field, static_cast<float>(noise_of.noisy_scale()), ws_.points, scene.own[k]);
+    kernel::select_own_points(ws_.candidate[k].field, static_cast<float>(noise_of.noisy_scale()), ws_.points, scene.own[k],
+                              &ws_.overlap.work);
   }
   if (params.contact.neighbour_retained_min > 0.0) {
     tiled_sobol(static_cast<std::uint32_t>(params.search.points), seeds_for(task, Purpose::kRetained, 0), ws_.retained_points);
   }
-  ws_.overlap.work = {};
 }
 
 void Scorer::race_to(double best) {
@@ -195,7 +195,7 @@ void Scorer::cover(float reach_um) {
   // The margin is for rounding alone.
   for (; covered_ < ws_.by_gap.size() && ws_.by_gap[covered_].gap_um <= 1.0001F * reach_um + 0.001F; ++covered_) {
     const Workspace::Neighbour& other = ws_.by_gap[covered_];
-    ws_.voxels.add(ws_.rasters.of(other.id, *other.body, ws_.overlap.work.field_count));
+    ws_.voxels.add(ws_.rasters.of(other.id, *other.body, ws_.overlap.work));
   }
 }
 

@@ -33,7 +33,6 @@ class Search {
     result.fitness = scorer_.score_finally(result.pair, result.crosses_wall, result.supported);
     result.evaluation_count = evaluation_count_;
     result.corrected = corrected_;
-    result.work = {1, evaluation_count_, ws_.overlap.work.field_count, ws_.overlap.work.noise_count};
     return result;
   }
 

@@ -36,10 +36,9 @@ struct SearchResult {
   bool corrected = false;
   bool crosses_wall = false;    // the winner reaches beyond the dish (on the fresh points): nothing better was found
   bool supported = true;        // with several layers, on the fresh points (support.hpp); if not, the fitness is 0
-  Work work;
 };
 
-/// `workspace` must be made from the same parameters. Throws Stopped when asked to (looked at before every generation).
+/// `workspace` must be made from the same parameters; its overlap.work grows by what the search takes. Throws Stopped when asked to (looked at before every generation).
 SearchResult find_space(const Colony& colony, const Params& params, const SearchTask& task, Workspace& workspace,
                         StopFlag stop = nullptr);
 /// The same with a workspace of its own.

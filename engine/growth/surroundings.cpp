@@ -56,7 +56,7 @@ double distance_um(const Vec3& point, const Box& box, int axis_count) {
 }  // namespace
 
 double free_share(const Colony& colony, const Params& params, Seed seed, const Cell& cell, std::uint32_t ordinal,
-                  const BodyChange& change) {
+                  const BodyChange& change, kernel::CountWork* work) {
   const double radius = params.wake.free_radius_um;
   const bool ball = params.layers == Layers::kMulti;
   std::vector<CellId> ids;
@@ -87,10 +87,12 @@ double free_share(const Colony& colony, const Params& params, Seed seed, const C
     ++n;
   }
   CHECK(n > 0);
+  if (work != nullptr) work->cover_count += n * covers.size();
   return static_cast<double>(kernel::count_uncovered(covers, points.x.data(), points.y.data(), points.z.data(), n)) / static_cast<double>(n);
 }
 
-std::vector<Woken> wake_sleepers(const Colony& colony, const Params& params, Seed seed, double time_h, const BodyChange& change) {
+std::vector<Woken> wake_sleepers(const Colony& colony, const Params& params, Seed seed, double time_h, const BodyChange& change,
+                                 kernel::CountWork* work) {
   const double radius = params.wake.free_radius_um;
   std::vector<Box> changed;
   if (change.gone) changed.push_back(colony.body(*change.gone).box());
@@ -119,7 +121,7 @@ std::vector<Woken> wake_sleepers(const Colony& colony, const Params& params, See
       return distance_um(cell.centre_um, box, ball ? 3 : 2) <= radius;
     });
     if (!near) continue;
-    const double share = free_share(colony, params, seed, cell, cell.ordinal, change);
+    const double share = free_share(colony, params, seed, cell, cell.ordinal, change, work);
     if (params.wake.rule == WakeRule::kShare && !(share >= *cell.free_share + params.wake.gain)) continue;
     woken.push_back({id, share, time_h + params.wake.retry_h});
   }

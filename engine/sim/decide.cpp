@@ -7,7 +7,6 @@
 
 #include "engine/base/check.hpp"
 #include "engine/base/maths.hpp"
-#include "engine/growth/search.hpp"
 #include "engine/growth/splitting.hpp"
 #include "engine/growth/surroundings.hpp"
 #include "engine/model/cycle.hpp"
@@ -98,14 +97,14 @@ Cell newborn(const BodyGeometry& body, const Cell& parent, double time_h, double
 }
 
 Inhibited inhibited(const Colony& colony, const Params& params, Seed seed, const Cell& cell, double time_h,
-                    const SearchResult& found) {
+                    const SearchResult& found, kernel::CountWork& work) {
   Inhibited event;
   event.fitness = found.fitness;
   event.evaluation_count = found.evaluation_count;
   event.corrected = found.corrected;
   event.try_count = cell.try_count + 1;
   // On the points of the ordinal the cell will have from this event on: those that later estimates will use.
-  event.free_share = free_share(colony, params, seed, cell, cell.ordinal + 1, {});
+  event.free_share = free_share(colony, params, seed, cell, cell.ordinal + 1, {}, &work);
   const bool unlucky = event.free_share > params.wake.free_min && event.try_count <= params.wake.tries_max;
   if (unlucky) {
     Stream stream(seed, cell.id, cell.ordinal, Purpose::kRetry);
@@ -116,11 +115,8 @@ Inhibited inhibited(const Colony& colony, const Params& params, Seed seed, const
 
 }  // namespace
 
-Decision decide_division(const Colony& colony, const Params& params, Seed seed, CellId id, double time_h, Workspace& workspace,
-                         StopFlag stop) {
+SearchTask search_task(const Colony& colony, const Params& params, Seed seed, CellId id, Workspace& workspace) {
   const Cell& parent = colony.cell(id);
-  if (params.division.generation_limit && parent.generation >= *params.division.generation_limit) return {Senesced{}, {}};
-
   SearchTask task;
   task.seed = seed;
   task.cell_id = id;
@@ -130,10 +126,22 @@ Decision decide_division(const Colony& colony, const Params& params, Seed seed, 
   for (std::uint32_t lane = 0; lane < 2; ++lane) {
     task.frame.noise_offsets[lane] = draw_noise_offset(params, seed, parent, lane);
   }
+  return task;
+}
+
+Decision decide_division(const Colony& colony, const Params& params, Seed seed, CellId id, double time_h, Workspace& workspace,
+                         StopFlag stop) {
+  const Cell& parent = colony.cell(id);
+  if (params.division.generation_limit && parent.generation >= *params.division.generation_limit) return {Senesced{}, {}};
+
+  kernel::CountWork& counted = workspace.overlap.work;
+  counted = {};
+  const SearchTask task = search_task(colony, params, seed, id, workspace);
   const SearchResult found = find_space(colony, params, task, workspace, stop);
   // The dish's wall is hard also where inhibition is off, and nobody floats.
   if (found.crosses_wall || !found.supported || (params.division.inhibition && !(found.fitness >= params.contact.fitness_min))) {
-    return {inhibited(colony, params, seed, parent, time_h, found), found.work};
+    Inhibited event = inhibited(colony, params, seed, parent, time_h, found, counted);
+    return {event, {counted, 1, found.evaluation_count}};
   }
 
   Divided event;
@@ -158,11 +166,12 @@ Decision decide_division(const Colony& colony, const Params& params, Seed seed, 
   event.evaluation_count = found.evaluation_count;
   event.corrected = found.corrected;
   const std::array<Body, 2> bodies = {Body(found.pair.bodies[0], params.noise), Body(found.pair.bodies[1], params.noise)};
-  event.woken = wake_sleepers(colony, params, seed, time_h, {id, bodies});
-  return {event, found.work};
+  event.woken = wake_sleepers(colony, params, seed, time_h, {id, bodies}, &counted);
+  return {event, {counted, 1, found.evaluation_count}};
 }
 
 Decision decide_settling(const Colony& colony, const Params& params, Seed seed, CellId id, Workspace& workspace) {
+  workspace.overlap.work = {};
   const Cell& cell = colony.cell(id);
   const Body& body = colony.body(id);
   const std::vector<const Body*>& neighbours = neighbours_of(colony, id, workspace);
@@ -179,7 +188,7 @@ Decision decide_settling(const Colony& colony, const Params& params, Seed seed, 
   event.nearest_membrane_um =
       nearest_membrane_um(body, neighbours, rule, event.nucleus_um, workspace.points, workspace.overlap, params.layers)
           .value_or(event.nucleus_um);
-  return {event, {}};
+  return {event, {workspace.overlap.work, 0, 0}};
 }
 
 }  // namespace colony

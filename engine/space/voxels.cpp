@@ -45,9 +45,9 @@ bool VoxelRaster::holds(std::int32_t x, std::int32_t y, std::int32_t z) const {
   return (rows[static_cast<std::size_t>((k * ny + j) * words_per_row + i / 32)] >> (i % 32)) & 1U;
 }
 
-void make_raster(const Body& body, double edge_um, VoxelRaster& out) {
+void make_raster(const Body& body, double edge_um, VoxelRaster& out, kernel::CountWork* work) {
   const kernel::FloatBody relative = frame_raster(body, edge_um, out);
-  kernel::raster_rows(relative, static_cast<float>(edge_um), out.nx, out.ny, out.nz, out.words_per_row, out.rows.data());
+  kernel::raster_rows(relative, static_cast<float>(edge_um), out.nx, out.ny, out.nz, out.words_per_row, out.rows.data(), work);
 }
 
 void make_raster_reference(const Body& body, double edge_um, VoxelRaster& out) {
@@ -63,7 +63,7 @@ void make_raster_reference(const Body& body, double edge_um, VoxelRaster& out) {
   }
 }
 
-const VoxelRaster& RasterCache::of(CellId id, const Body& body, std::uint64_t& field_count) {
+const VoxelRaster& RasterCache::of(CellId id, const Body& body, kernel::CountWork& work) {
   while (slots_.size() < kSlotsMax && slots_.size() < id.value) {
     std::vector<Slot> grown(std::max<std::size_t>(64, 2 * slots_.size()));
     for (Slot& slot : slots_) {
@@ -78,8 +78,7 @@ const VoxelRaster& RasterCache::of(CellId id, const Body& body, std::uint64_t& f
     slot.centre = body.centre_um();
     slot.to_unit = body.to_unit();
     slot.noise_offset = body.noise_offset();
-    make_raster(body, edge_um_, slot.raster);
-    field_count += static_cast<std::uint64_t>(slot.raster.nx) * static_cast<std::uint64_t>(slot.raster.ny) * static_cast<std::uint64_t>(slot.raster.nz);
+    make_raster(body, edge_um_, slot.raster, &work);
   }
   return slot.raster;
 }

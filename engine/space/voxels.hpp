@@ -17,6 +17,7 @@
 
 #include "engine/model/params.hpp"
 #include "engine/shape/body.hpp"
+#include "engine/space/overlap_kernel.hpp"
 
 namespace colony {
 
@@ -29,7 +30,7 @@ struct VoxelRaster {
   bool holds(std::int32_t x, std::int32_t y, std::int32_t z) const;
 };
 
-void make_raster(const Body& body, double edge_um, VoxelRaster& out);
+void make_raster(const Body& body, double edge_um, VoxelRaster& out, kernel::CountWork* work = nullptr);
 /// The brute-force twin, cube by cube.
 void make_raster_reference(const Body& body, double edge_um, VoxelRaster& out);
 
@@ -37,8 +38,8 @@ void make_raster_reference(const Body& body, double edge_um, VoxelRaster& out);
 class RasterCache {
  public:
   explicit RasterCache(double edge_um) : edge_um_(edge_um) {}
-  /// Valid until the next call. Adds the evaluations it took to `field_count`.
-  const VoxelRaster& of(CellId id, const Body& body, std::uint64_t& field_count);
+  /// Valid until the next call. Adds the evaluations it took to `work`.
+  const VoxelRaster& of(CellId id, const Body& body, kernel::CountWork& work);
 
  private:
   struct Slot {

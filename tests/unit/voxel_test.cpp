@@ -167,12 +167,12 @@ TEST(RasterCache, NeverServesABodyThatHasMovedOrDivided) {
     const Body body(geometry, testing::rough());
     VoxelRaster expected;
     make_raster(body, edge_um, expected);
-    std::uint64_t field_count = 0;
-    ASSERT_TRUE(equal(cache.of(id, body, field_count), expected)) << "step " << step;
-    (field_count > 0 ? made : kept) += 1;
-    field_count = 0;
-    ASSERT_TRUE(equal(cache.of(id, body, field_count), expected)) << "step " << step;
-    EXPECT_EQ(field_count, 0U);
+    kernel::CountWork work;
+    ASSERT_TRUE(equal(cache.of(id, body, work), expected)) << "step " << step;
+    (work.field_count > 0 ? made : kept) += 1;
+    work = {};
+    ASSERT_TRUE(equal(cache.of(id, body, work), expected)) << "step " << step;
+    EXPECT_EQ(work.field_count, 0U);
   }
   EXPECT_GT(made, 1000);
   EXPECT_GT(kept, 100);
