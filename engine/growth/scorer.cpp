@@ -27,6 +27,19 @@ double share_left(std::uint32_t hits, std::uint32_t shared) {
 
 }  // namespace
 
+void search_points(const Params& params, const std::array<std::uint32_t, 3>& seeds, PointSet& out) {
+  const auto points = static_cast<std::uint32_t>(params.search.points);
+  scrambled_sobol(std::min(2 * points, kSobolPointsMax), seeds, out);
+  out.count = std::min(points + points / 2, kSobolPointsMax);
+}
+
+PointSet search_points(const Params& params, Stream& stream) {
+  const std::array<std::uint32_t, 3> seeds = {stream.next_u32(), stream.next_u32(), stream.next_u32()};
+  PointSet points;
+  search_points(params, seeds, points);
+  return points;
+}
+
 Scorer::Scorer(const Colony& colony, const Params& params, const SearchTask& task, Workspace& workspace)
     : colony_(colony), params_(params), task_(task), ws_(workspace) {
   const double reach = search_reach_um(params);
@@ -62,11 +75,7 @@ Scorer::Scorer(const Colony& colony, const Params& params, const SearchTask& tas
     scene.wall_y = static_cast<float>(-c.y());
     scene.wall_radius2 = static_cast<float>(radius * radius);
   }
-  // In the order of the sequence: every prefix is a fair sample. The cube about the unit frame is 1.3 to 1.5 times the body's own box
-  // above the dish, which search.points is about: half as many more, so that no fewer fall inside.
-  const auto points = static_cast<std::uint32_t>(params.search.points);
-  scrambled_sobol(std::min(2 * points, kSobolPointsMax), seeds_for(task, Purpose::kSearchPoints, 0), ws_.points);
-  ws_.points.count = std::min(points + points / 2, kSobolPointsMax);
+  search_points(params, seeds_for(task, Purpose::kSearchPoints, 0), ws_.points);
   for (std::size_t k = 0; k < 2; ++k) {
     // Only the noise of this body counts: its place and shape are the candidate's.
     const Body noise_of({Vec3::Zero(), Vec3::Ones(), Vec3::Zero(), task.frame.noise_offsets[k]}, params.noise);

@@ -15,6 +15,12 @@
 
 namespace colony {
 
+/// The points of a search in the unit cube, in the order of the sequence: every prefix is a fair sample. The cube about the unit frame is 1.3
+/// to 1.5 times the body's own box above the dish, which search.points is about: half as many more, so that no fewer fall inside.
+void search_points(const Params& params, const std::array<std::uint32_t, 3>& seeds, PointSet& out);
+/// With the next three words of `stream` as seeds.
+PointSet search_points(const Params& params, Stream& stream);
+
 /// Scores candidate pairs of one search.
 class Scorer {
  public:

@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "engine/base/check.hpp"
+#include "engine/growth/scorer.hpp"
 #include "engine/growth/search.hpp"
 #include "tests/support/any_params.hpp"
 #include "tests/support/runs.hpp"
@@ -204,7 +205,7 @@ TEST(SearchStage, IsWhatASearchPrepares) {
     find_space(colony, params, task, workspace);
     PointSet points;
     Stream seeds(task.seed, task.cell_id, task.ordinal, Purpose::kSearchPoints);
-    points = scrambled_sobol(static_cast<std::uint32_t>(params.search.points), seeds);
+    points = search_points(params, seeds);
     stage.open(task.frame, points, std::nullopt);
     const kernel::SearchScene &own = stage.scene, &theirs = workspace.scene;
     EXPECT_EQ(own.dish_z, theirs.dish_z);
