@@ -44,10 +44,11 @@ inline Rgb lit(Rgb colour, double brightness) {
   return {scale(colour.red), scale(colour.green), scale(colour.blue)};
 }
 
-/// Pixels outside the picture are not drawn.
+/// Pixels outside the picture, or outside the strip of it that is held, are not drawn.
 inline void put_pixel(Picture& picture, std::int64_t row, std::int64_t column, Rgb colour) {
-  if (row < 0 || row >= picture.height_px || column < 0 || column >= picture.width_px) return;
-  const std::size_t at = static_cast<std::size_t>(3 * (row * picture.width_px + column));
+  if (row < picture.first_row || column < 0 || column >= picture.width_px) return;
+  const std::size_t at = static_cast<std::size_t>(3 * ((row - picture.first_row) * picture.width_px + column));
+  if (at >= picture.rgb.size()) return;
   picture.rgb[at] = colour.red;
   picture.rgb[at + 1] = colour.green;
   picture.rgb[at + 2] = colour.blue;

@@ -1,49 +1,80 @@
-// render: a top view of the deformed cells as an RGB raster.
-// Method:  for every pixel the column z >= 0 is searched for the highest point of any f~ >= 0; at contacts the exact face f_i = f_j.
+// render: a colony from above, as an RGB raster in one of several styles.
+// Method:  shaded, contours and labels show the visible surface (top_view.hpp), brightfield and phase what light meets on
+//          its way through (paths.hpp, optics.hpp). Painted strip by strip, so that what is not kept costs the memory of
+//          a strip.
 // Units:   um, pixels; y up. The frame has a margin of 5 % of the extent on each side.
-// Threads: pure; the picture is a function of its arguments only.
+// Threads: as many as asked for; the picture is a function of colony, parameters and spec only.
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "engine/base/result.hpp"
 #include "engine/base/stop.hpp"
 #include "engine/model/colony.hpp"
+#include "engine/picture/frame.hpp"
+#include "engine/picture/parallel.hpp"
 
 namespace colony {
 
-enum class PictureStyle { kShaded, kContours };
+enum class PictureStyle { kShaded, kContours, kBrightfield, kPhase, kLabels };
 enum class ColourBy { kActivity, kGeneration, kAge, kVolume };
+/// Which borders `contours` draws: those between cell and background (holes included), those between two cells, or all.
+enum class ContourLines { kBoth, kColony, kCells };
+
+inline constexpr std::int64_t kPictureSideMax_px = 4096;  // unless the spec says otherwise
+inline constexpr std::int64_t kRasterSideMax_px = 20000;  // whatever the spec says
 
 struct PictureSpec {
   PictureStyle style = PictureStyle::kShaded;
-  ColourBy colour_by = ColourBy::kActivity;
+  ColourBy colour_by = ColourBy::kActivity;          // shaded only
+  ContourLines contour_lines = ContourLines::kBoth;  // contours only
   /// Exactly one of the two is used: um_per_px if > 0, else width_px.
   double um_per_px = 0.0;
   std::int64_t width_px = 1024;
-  bool scale_bar = true;    // and the legend of the colours
+  /// And the legend of the colours. `labels` never has one: every pixel of it is an id.
+  bool scale_bar = true;
+  std::int64_t side_max_px = kPictureSideMax_px;  // 1..kRasterSideMax_px
 };
 
-inline constexpr std::int64_t kPictureSideMax_px = 4096;  // about 15 s of one core for a full frame
-
-/// 8-bit RGB, row-major from the top row.
+/// 8-bit RGB, row-major from the top row; a strip holds rows from `first_row` on.
 struct Picture {
   std::int64_t width_px = 0;
-  std::int64_t height_px = 0;
+  std::int64_t height_px = 0;  // of the whole picture
   double um_per_px = 0.0;
-  double left_um = 0.0;     // x of the left edge
-  double top_um = 0.0;      // y of the top edge
+  double left_um = 0.0;  // x of the left edge
+  double top_um = 0.0;   // y of the top edge
+  std::int64_t first_row = 0;
   std::vector<std::uint8_t> rgb;
 };
 
-/// Errors (kInvalid/kLimit, pointer = the query parameter): a scale that makes a side longer than kPictureSideMax_px.
-/// A colony without cells gives an empty background of 100 um.
-/// Throws Stopped when asked to.
+/// The frame of a spec: all bodies and the margin; 100 um for a colony without cells.
+/// Errors (kInvalid/kLimit, pointer = the query parameter): a scale out of range or one that makes a side longer than
+/// side_max_px.
+Result<Frame> frame_of(const Colony& colony, const PictureSpec& spec);
+
+/// Errors: as frame_of; `labels` of a colony beyond kLabelColours cells (kLimit, style). Throws Stopped when asked to.
 Result<Picture> render(const Colony& colony, const Params& params, const PictureSpec& spec, StopFlag stop = nullptr);
+Result<Picture> render(const Colony& colony, const Params& params, const PictureSpec& spec, const Effort& effort);
+
+/// The same picture as strips of rows from the top, each valid during its call. Memory: about 70 MB at 20,000 pixels.
+Status render_strips(const Colony& colony, const Params& params, const PictureSpec& spec, const Effort& effort,
+                     const std::function<void(const Picture& strip)>& take);
+
+/// The same picture as PNG bytes, handed over piece by piece, in order.
+Status render_png(const Colony& colony, const Params& params, const PictureSpec& spec, const Effort& effort,
+                  const std::function<void(std::string_view bytes)>& take);
 
 /// PNG bytes of a picture, with its physical pixel size (pHYs).
 std::string encode_png(const Picture& picture);
+
+/// `labels`: a cell's colour is its id times an odd number modulo 2^24 (red the highest byte): neighbours by id differ,
+/// and each colour is one id. Background is black, id 0.
+inline constexpr std::uint32_t kLabelColours = 1U << 24;
+std::uint32_t label_colour(CellId id);
+CellId label_of_colour(std::uint32_t rgb);
 
 }  // namespace colony

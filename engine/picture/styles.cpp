@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/picture/optics.hpp"
+
 namespace colony {
 namespace {
 
@@ -93,13 +95,55 @@ void paint_shaded(const TopView& view, RowRange rows, const std::vector<Rgb>& co
   }
 }
 
-void paint_contours(const TopView& view, RowRange rows, Picture& picture) {
+void paint_contours(const TopView& view, RowRange rows, ContourLines lines, Picture& picture) {
   for (std::int64_t row = rows.first; row < rows.end; ++row) {
     for (std::int64_t column = 0; column < view.frame.width_px; ++column) {
       const std::uint32_t owner = owner_at(view, row, column);
-      const bool line = owner_at(view, row - 1, column) < owner || owner_at(view, row + 1, column) < owner ||
-                        owner_at(view, row, column - 1) < owner || owner_at(view, row, column + 1) < owner;
+      const auto borders = [&](std::uint32_t other) {
+        if (lines == ContourLines::kColony) return owner != 0 && other == 0;
+        return other < owner && (lines == ContourLines::kBoth || other != 0);
+      };
+      const bool line = borders(owner_at(view, row - 1, column)) || borders(owner_at(view, row + 1, column)) ||
+                        borders(owner_at(view, row, column - 1)) || borders(owner_at(view, row, column + 1));
       put_pixel(picture, row, column, line ? kBlack : kWhite);
+    }
+  }
+}
+
+void paint_labels(const TopView& view, RowRange rows, Picture& picture) {
+  for (std::int64_t row = rows.first; row < rows.end; ++row) {
+    for (std::int64_t column = 0; column < view.frame.width_px; ++column) {
+      const std::uint32_t colour = label_colour(CellId{owner_at(view, row, column)});
+      put_pixel(picture, row, column,
+                {static_cast<std::uint8_t>(colour >> 16), static_cast<std::uint8_t>((colour >> 8) & 255),
+                 static_cast<std::uint8_t>(colour & 255)});
+    }
+  }
+}
+
+void paint_brightfield(const PathView& view, RowRange rows, Picture& picture) {
+  for (std::int64_t row = rows.first; row < rows.end; ++row) {
+    for (std::int64_t column = 0; column < view.frame.width_px; ++column) {
+      const std::size_t at = view.index(row, column);
+      if (!(view.cell_um[at] > 0.0F)) {
+        put_pixel(picture, row, column, kWhite);
+        continue;
+      }
+      const auto channel = [&](int colour) {
+        const double share =
+            transmission(colour, static_cast<double>(view.cell_um[at]), static_cast<double>(view.nucleus_um[at]));
+        return static_cast<std::uint8_t>(255.0 * share + 0.5);
+      };
+      put_pixel(picture, row, column, {channel(0), channel(1), channel(2)});
+    }
+  }
+}
+
+void paint_phase(const PathView& view, const std::vector<float>& intensity, RowRange rows, Picture& picture) {
+  for (std::int64_t row = rows.first; row < rows.end; ++row) {
+    for (std::int64_t column = 0; column < view.frame.width_px; ++column) {
+      const auto grey = static_cast<std::uint8_t>(255.0F * intensity[view.index(row, column)] + 0.5F);
+      put_pixel(picture, row, column, {grey, grey, grey});
     }
   }
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "engine/base/check.hpp"
+#include "engine/picture/bands.hpp"
 #include "engine/picture/column.hpp"
 #include "engine/picture/pixels.hpp"
 
@@ -16,24 +17,11 @@ std::uint8_t disc_cover(double distance_um, double radius_um, double um_per_px) 
   return static_cast<std::uint8_t>(std::clamp(share, 0.0, 1.0) * 255.0 + 0.5);
 }
 
-/// Indices of the pixel centres in [low, high], clipped to [begin, end).
-struct Span {
-  std::int64_t begin;
-  std::int64_t end;
-};
-Span centres_within(double low_px, double high_px, std::int64_t begin, std::int64_t end) {
-  const double low = std::clamp(low_px - 0.5, static_cast<double>(begin), static_cast<double>(end));
-  const double high = std::clamp(high_px - 0.5, static_cast<double>(begin) - 1.0, static_cast<double>(end) - 1.0);
-  return {ceil_to_int(low), floor_to_int(high) + 1};
-}
-
-void draw_body(TopView& view, CellId id, const Body& body) {
+void draw_body(TopView& view, RowRange band, CellId id, const Body& body) {
   const Frame& frame = view.frame;
-  const Box& box = body.box();
-  const Span columns = centres_within((box.low.x() - frame.left_um) / frame.um_per_px,
-                                      (box.high.x() - frame.left_um) / frame.um_per_px, 0, frame.width_px);
-  const Span rows = centres_within((frame.top_um - box.high.y()) / frame.um_per_px,
-                                   (frame.top_um - box.low.y()) / frame.um_per_px, view.rows.first, view.rows.end);
+  const Box box = body.box();
+  const Span columns = columns_of(box, frame);
+  const Span rows = rows_of(box, frame, band);
   const ColumnScan scan(body);
   for (std::int64_t row = rows.begin; row < rows.end; ++row) {
     const double y_um = frame.y_um(row);
@@ -49,14 +37,14 @@ void draw_body(TopView& view, CellId id, const Body& body) {
   }
 }
 
-void draw_nucleus(TopView& view, const Cell& cell) {
+void draw_nucleus(TopView& view, RowRange band, const Cell& cell) {
   const Frame& frame = view.frame;
   const double reach_um = cell.nucleus_radius_um + frame.um_per_px;
   const double x_px = (cell.nucleus_um.x() - frame.left_um) / frame.um_per_px;
   const double y_px = (frame.top_um - cell.nucleus_um.y()) / frame.um_per_px;
   const double reach_px = reach_um / frame.um_per_px;
   const Span columns = centres_within(x_px - reach_px, x_px + reach_px, 0, frame.width_px);
-  const Span rows = centres_within(y_px - reach_px, y_px + reach_px, view.rows.first, view.rows.end);
+  const Span rows = centres_within(y_px - reach_px, y_px + reach_px, band.first, band.end);
   for (std::int64_t row = rows.begin; row < rows.end; ++row) {
     const double dy_um = frame.y_um(row) - cell.nucleus_um.y();
     for (std::int64_t column = columns.begin; column < columns.end; ++column) {
@@ -70,7 +58,7 @@ void draw_nucleus(TopView& view, const Cell& cell) {
 
 }  // namespace
 
-TopView top_view(const Colony& colony, const Frame& frame, RowRange rows) {
+TopView top_view(const Colony& colony, const Frame& frame, RowRange rows, const Effort& effort) {
   CHECK(rows.first >= 0 && rows.first <= rows.end && rows.end <= frame.height_px);
   CHECK(frame.width_px > 0 && frame.um_per_px > 0.0);
   TopView view;
@@ -82,19 +70,12 @@ TopView top_view(const Colony& colony, const Frame& frame, RowRange rows) {
   view.nucleus.assign(pixel_count, 0);
   if (pixel_count == 0) return view;
 
-  // All bodies are asked, not the grid: its columns are many more than the cells where few cells lie far apart.
-  const double top_um = frame.top_um - static_cast<double>(rows.first) * frame.um_per_px;
-  const double bottom_um = frame.top_um - static_cast<double>(rows.end) * frame.um_per_px;
-  const auto in_strip = [&](CellId id) {
-    const Box& box = colony.body(id).box();
-    return box.high.y() >= bottom_um && box.low.y() <= top_um;
-  };
-  for (const Cell& cell : colony.cells()) {
-    if (in_strip(cell.id)) draw_body(view, cell.id, colony.body(cell.id));
-  }
-  for (const Cell& cell : colony.cells()) {
-    if (in_strip(cell.id)) draw_nucleus(view, cell);
-  }
+  const BandCells cells(colony, frame, rows);
+  for_each_piece(cells.band_count(), effort, [&](std::size_t index) {
+    const RowRange band = cells.band(index);
+    for (const CellId id : cells.of_band(index)) draw_body(view, band, id, colony.body(id));
+    for (const CellId id : cells.of_band(index)) draw_nucleus(view, band, colony.cell(id));
+  });
   return view;
 }
 

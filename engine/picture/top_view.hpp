@@ -5,8 +5,9 @@
 //          each body is scanned alone, from above (column.hpp), and a height buffer keeps the highest. Where two
 //          neighbours reach equally high is their border, the upper rim of the face f_i = f_j.
 // Units:   um, pixels; y up, row 0 at the top; a pixel is its centre.
-// Errors:  none at run time; CHECKs the rows.
-// Threads: pure. Equal heights go to the lower id, so the order of work cannot matter.
+// Errors:  CHECKs the rows; throws Stopped.
+// Threads: pure. Bands of rows are worked on side by side, each by one thread with its cells in ascending order; equal
+//          heights go to the lower id.
 #pragma once
 
 #include <cstddef>
@@ -14,25 +15,10 @@
 #include <vector>
 
 #include "engine/model/colony.hpp"
+#include "engine/picture/frame.hpp"
+#include "engine/picture/parallel.hpp"
 
 namespace colony {
-
-/// Where the pixels lie in the plane.
-struct Frame {
-  std::int64_t width_px = 0;
-  std::int64_t height_px = 0;
-  double um_per_px = 0.0;
-  double left_um = 0.0;  // x of the left edge
-  double top_um = 0.0;   // y of the top edge
-  double x_um(std::int64_t column) const { return left_um + (static_cast<double>(column) + 0.5) * um_per_px; }
-  double y_um(std::int64_t row) const { return top_um - (static_cast<double>(row) + 0.5) * um_per_px; }
-};
-
-/// Rows [first, end) of a frame.
-struct RowRange {
-  std::int64_t first = 0;
-  std::int64_t end = 0;
-};
 
 /// One entry a pixel, row-major from row `rows.first`. A picture is made of strips of rows, so that the memory is that
 /// of a strip.
@@ -51,7 +37,7 @@ struct TopView {
 };
 
 /// The rows `rows` of the view; the same pixels whatever the rows asked for around them.
-TopView top_view(const Colony& colony, const Frame& frame, RowRange rows);
+TopView top_view(const Colony& colony, const Frame& frame, RowRange rows, const Effort& effort = {});
 inline TopView top_view(const Colony& colony, const Frame& frame) {
   return top_view(colony, frame, {0, frame.height_px});
 }

@@ -30,10 +30,12 @@ export const thirdParty = [
   { prefix: 'sqlite3.h', places: ['server/store/'] },
   { prefix: 'SQLiteCpp/', places: ['server/store/'] },
   { prefix: 'spng.h', places: ['engine/picture/'] },
+  { prefix: 'tiffio.h', places: ['engine/picture/'] },
+  { prefix: 'zlib.h', places: ['engine/picture/'] },
   { prefix: 'xxhash.h', places: ['engine/base/'] },
   { prefix: 'Random123/', places: ['engine/random/'] },
   { prefix: 'xmmintrin.h', places: ['engine/base/'] },  // the floating-point mode
-  { prefix: 'hwy/', places: ['engine/space/', 'engine/random/'] },
+  { prefix: 'hwy/', places: ['engine/space/', 'engine/random/sobol_simd.cpp', 'engine/picture/path_simd.cpp'] },
   { prefix: 'tbb/', places: ['engine/sim/', 'engine/growth/scorer.*'] },
   { prefix: 'oneapi/', places: [] },  // the same library's other name: say tbb/
   { prefix: 'Eigen/', places: ['engine/'] },
