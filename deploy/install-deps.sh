@@ -12,6 +12,7 @@ packages=(
   nlohmann-json3-dev        # server/api, client
   libeigen3-dev librandom123-dev libxxhash-dev libhwy-dev libspng-dev libtbb-dev   # engine
   libtiff-dev zlib1g-dev    # engine/picture: OME-TIFF
+  libopencv-core-dev libopencv-imgproc-dev                   # engine/analysis, engine/picture: standard morphology
   libsqlite3-dev sqlite3                                     # server/store; the shell reads the database in the tests
   libspdlog-dev libtomlplusplus-dev                          # server
   libcli11-dev libcurl4-openssl-dev                          # client

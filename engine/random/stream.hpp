@@ -32,6 +32,7 @@ enum class Purpose : std::uint8_t {
   kMoveSurroundings = 16,  // scrambling of the disc in which a move looks for the freer half
   kMovePoints = 17,      // scrambling of the points on which a moved body is scored
   kSplitPerpendicular = 18,  // several layers: which of the planes through nucleus centre and nearest membrane point
+  kControl = 32,         // places of the discs of a random control; no part of any history
 };
 
 class Stream {

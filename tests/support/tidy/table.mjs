@@ -32,6 +32,7 @@ export const thirdParty = [
   { prefix: 'spng.h', places: ['engine/picture/'] },
   { prefix: 'tiffio.h', places: ['engine/picture/'] },
   { prefix: 'zlib.h', places: ['engine/picture/'] },
+  { prefix: 'opencv2/', places: ['engine/analysis/', 'engine/picture/'] },
   { prefix: 'xxhash.h', places: ['engine/base/'] },
   { prefix: 'Random123/', places: ['engine/random/'] },
   { prefix: 'xmmintrin.h', places: ['engine/base/'] },  // the floating-point mode

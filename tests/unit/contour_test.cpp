@@ -1,0 +1,235 @@
+#include "engine/analysis/contour.hpp"
+
+#include <cmath>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "engine/analysis/controls.hpp"
+#include "engine/analysis/report.hpp"
+#include "engine/base/maths.hpp"
+#include "tests/support/founding.hpp"
+#include "tests/support/fractals.hpp"
+#include "tests/support/label_images.hpp"
+
+namespace colony {
+namespace {
+
+using namespace testing;
+using ::testing::ElementsAre;
+
+const LabelImage kRing = drawn({"........",
+                                ".aaaab..",
+                                ".aaaabb.",
+                                ".aa.abb.",
+                                ".aaabbb.",
+                                "........"});
+
+TEST(Contour, OutlineLeavesHolesAndWallsOut) {
+  EXPECT_THAT(text_of(*colony_outline(kRing)), ElementsAre("........",
+                                                           ".#####..",
+                                                           ".#....#.",
+                                                           ".#....#.",
+                                                           ".######.",
+                                                           "........"));
+}
+
+TEST(Contour, WallsAreDrawnOnceOnTheHigherLabel) {
+  EXPECT_THAT(text_of(*cell_walls(kRing)), ElementsAre("........",
+                                                       ".#####..",
+                                                       ".#.#.##.",
+                                                       ".##.###.",
+                                                       ".######.",
+                                                       "........"));
+}
+
+TEST(Contour, BoundaryOfASetIncludesItsHoles) {
+  EXPECT_THAT(text_of(*boundary_of(foreground_of(kRing))), ElementsAre("........",
+                                                                       ".#####..",
+                                                                       ".#.#..#.",
+                                                                       ".##.#.#.",
+                                                                       ".######.",
+                                                                       "........"));
+}
+
+TEST(Contour, TheFrameIsNoBorder) {
+  const LabelImage cut = drawn({"aaa.", "aaa.", "bbb."});
+  EXPECT_THAT(text_of(*colony_outline(cut)), ElementsAre("..#.", "..#.", "..#."));
+  EXPECT_THAT(text_of(*cell_walls(cut)), ElementsAre("..#.", "..#.", "###."));
+  EXPECT_THAT(text_of(*colony_outline(drawn({"aa", "aa"}))), ElementsAre("..", ".."));
+}
+
+TEST(Contour, AClosedGapLetsNoBackgroundIn) {
+  const LabelImage parted = drawn({"........", ".aa.bb..", ".aa.bb..", ".aa.bb..", "........"});
+  EXPECT_EQ(outside_of(parted)->at(2, 3), 255);
+  EXPECT_EQ(outside_of(parted, 1)->at(2, 3), 0);
+  EXPECT_EQ(outside_of(parted, 1)->at(2, 6), 255);
+  EXPECT_FALSE(outside_of(parted, 9));
+}
+
+/// No 4-connected way leads from one label to another but over a drawn pixel: what makes the line a line.
+TEST(Contour, WallsSeparateLabels) {
+  const LabelImage labels = *random_disc_control(std::vector<LabelArea>(60, {0, 300}), 1);
+  LabelImage numbered = labels;
+  const BinaryImage walls = *cell_walls(numbered);
+  for (std::int64_t row = 0; row < labels.height_px; ++row) {
+    for (std::int64_t column = 0; column + 1 < labels.width_px; ++column) {
+      if (labels.at(row, column) == labels.at(row, column + 1)) continue;
+      EXPECT_TRUE(walls.at(row, column) != 0 || walls.at(row, column + 1) != 0);
+    }
+  }
+}
+
+std::vector<LabelArea> areas_of(std::size_t count, std::uint64_t first, std::uint64_t step) {
+  std::vector<LabelArea> areas;
+  for (std::size_t i = 0; i < count; ++i) areas.push_back({static_cast<std::uint32_t>(i + 1), first + step * i});
+  return areas;
+}
+
+TEST(Controls, HexagonalMatchesNumberAndMeanArea) {
+  const std::vector<LabelArea> areas = areas_of(91, 500, 10);
+  const LabelImage control = *hexagonal_control(areas, 0.5);
+  EXPECT_EQ(control.um_per_px, 0.5);
+  const std::vector<LabelArea> found = label_areas(control);
+  ASSERT_EQ(found.size(), 91u);
+  double mean = 0.0;
+  for (const LabelArea& area : found) mean += static_cast<double>(area.area_px) / 91.0;
+  EXPECT_NEAR(mean, 950.0, 5.0);
+  // 91 = 1 + 6 + 12 + 18 + 24 + 30: whole shells, as wide as high (times sqrt(3)/2 of 10 steps).
+  const double radius = std::sqrt(950.0 / maths::kPi);
+  EXPECT_NEAR(static_cast<double>(control.width_px), 10.0 * 2.0 * radius + 4.0 * radius, 2.0);
+  EXPECT_NEAR(static_cast<double>(control.height_px), 10.0 * std::sqrt(3.0) * radius + 4.0 * radius, 2.0);
+}
+
+TEST(Controls, RandomDiscsMatchNumberAndSizesAndHangOnTheSeedAlone) {
+  const std::vector<LabelArea> areas = areas_of(200, 200, 3);
+  const LabelImage control = *random_disc_control(areas, 7);
+  EXPECT_EQ(control, *random_disc_control(areas, 7));
+  EXPECT_NE(control, *random_disc_control(areas, 8));
+  // A disc alone keeps its size.
+  EXPECT_NEAR(static_cast<double>(label_areas(*random_disc_control({{5, 2000}}, 1)).front().area_px), 2000.0, 40.0);
+  EXPECT_EQ(label_areas(*random_disc_control({{5, 2000}}, 1)).front().label, 5u);
+  // Uniform places: discs of the colony's own area leave about exp(-1) of the middle open (the Boolean model).
+  std::uint64_t open = 0, all = 0;
+  for (std::int64_t row = control.height_px / 3; row < control.height_px * 2 / 3; ++row) {
+    for (std::int64_t column = control.width_px / 3; column < control.width_px * 2 / 3; ++column) {
+      ++all;
+      open += control.at(row, column) == 0 ? 1 : 0;
+    }
+  }
+  EXPECT_NEAR(static_cast<double>(open) / static_cast<double>(all), std::exp(-1.0), 0.1);
+}
+
+TEST(Controls, RefuseByName) {
+  EXPECT_EQ(hexagonal_control({}).error().fields.front().pointer, "areas");
+  EXPECT_EQ(random_disc_control({}, 1).error().fields.front().pointer, "areas");
+  EXPECT_EQ(hexagonal_control(std::vector<LabelArea>(1000, {1, 400'000'000})).error().code, ErrorCode::kLimit);
+  const Colony colony = found(paper(), {ball_at(0, 0, 6.0)});
+  EXPECT_FALSE(noise_free_control(colony, 0, 10, 1.0, 0.0, 0.0));
+  EXPECT_EQ(noise_free_control(colony, 50'000, 10, 1.0, 0.0, 0.0).error().code, ErrorCode::kLimit);
+  EXPECT_FALSE(noise_free_control(colony, 10, 10, 1.0, std::nan(""), 0.0));
+}
+
+/// The highest point by brute force over the smooth field.
+TEST(Controls, WithoutNoiseIsTheViewOfTheSmoothBodies) {
+  const Colony colony = found(paper(), scattered_cells(12, 30.0, 5));
+  const double scale = 0.7, left = -33.0, top = 29.0;
+  const LabelImage control = *noise_free_control(colony, 90, 80, scale, left, top);
+  int covered = 0;
+  for (std::int64_t row = 0; row < 80; row += 3) {
+    for (std::int64_t column = 0; column < 90; column += 3) {
+      const double x = left + (static_cast<double>(column) + 0.5) * scale, y = top - (static_cast<double>(row) + 0.5) * scale;
+      double best = -1.0, second = -1.0;
+      std::uint32_t owner = 0;
+      for (const Cell& cell : colony.cells()) {
+        for (double z = 8.0; z >= 0.0; z -= 0.01) {
+          if (colony.body(cell.id).smooth_field(Vec3(x, y, z)) < 0.0) continue;
+          if (z > best) {
+            second = best;
+            best = z;
+            owner = cell.id.value;
+          } else {
+            second = std::max(second, z);
+          }
+          break;
+        }
+      }
+      // Between steps the order of two equal heights is open; so is a rim that a step misses.
+      if (best >= 0.0 && best - second > 0.02) {
+        EXPECT_EQ(control.at(row, column), owner) << row << " " << column;
+        ++covered;
+      }
+    }
+  }
+  EXPECT_GT(covered, 100);
+}
+
+TEST(Report, ControlsStandBesideTheAnswerAndTheCrossoverIsSaid) {
+  // A colony that is the hexagonal control itself, so what must come out is known.
+  const LabelImage labels = *hexagonal_control(areas_of(169, 1600, 0), 0.25);
+  LabelInput input;
+  input.labels = &labels;
+  input.without_noise = &labels;
+  const LabelReport report = *analyse_labels(input);
+  ASSERT_EQ(report.controls.size(), 3u);
+  EXPECT_EQ(report.controls[0].name, "without_noise");
+  EXPECT_EQ(report.controls[1].name, "hexagonal");
+  EXPECT_EQ(report.controls[2].name, "random_discs");
+  ASSERT_TRUE(report.lines.walls.dimensions && report.controls[1].lines.walls.dimensions);
+  EXPECT_EQ(report.lines.walls.dimensions->counts, report.controls[0].lines.walls.dimensions->counts);
+  EXPECT_NEAR(report.lines.walls.dimensions->capacity.value, report.controls[1].lines.walls.dimensions->capacity.value, 0.02);
+  EXPECT_TRUE(report.lines.walls.dimensions->crossover.found);
+  EXPECT_EQ(report.cell_count, 169u);
+  EXPECT_NEAR(report.px_per_cell_diameter, 2.0 * std::sqrt(1600.0 / maths::kPi), 0.2);
+  ASSERT_FALSE(report.verdict.empty());
+  EXPECT_NE(report.verdict[0].find("crossover, not scaling"), std::string::npos) << report.verdict[0];
+  EXPECT_NE(report.verdict[1].find("no difference"), std::string::npos) << report.verdict[1];
+}
+
+TEST(Report, WhatCannotBeMeasuredSaysWhy) {
+  const LabelImage tiny = drawn({".....", ".aab.", ".aab.", "....."});
+  LabelInput input;
+  input.labels = &tiny;
+  const LabelReport report = *analyse_labels(input);
+  EXPECT_FALSE(report.lines.walls.dimensions);
+  EXPECT_NE(report.lines.walls.reason.find("box sides"), std::string::npos);
+  EXPECT_EQ(report.cell_count, 2u);
+  const LabelImage empty(100, 100);
+  input.labels = &empty;
+  EXPECT_EQ(analyse_labels(input).error().fields.front().pointer, "image");
+  input.labels = &tiny;
+  input.boxes.offsets_per_axis = 0;
+  EXPECT_EQ(analyse_labels(input).error().fields.front().pointer, "offsets_per_axis");
+}
+
+TEST(Sweep, EveryThresholdIsCountedWithTheSameBoxes) {
+  // A cone: the set above t is a disc, its boundary a circle, whatever the threshold.
+  GreyImage cone(600, 600);
+  for (std::int64_t row = 0; row < 600; ++row) {
+    for (std::int64_t column = 0; column < 600; ++column) {
+      const double dx = static_cast<double>(column) - 300.0, dy = static_cast<double>(row) - 300.0;
+      cone.at(row, column) = static_cast<std::uint8_t>(std::max(0.0, 255.0 - 0.85 * std::sqrt(dx * dx + dy * dy)));
+    }
+  }
+  const ThresholdSweep sweep = *threshold_sweep(cone, {40, 80, 120, 160}, false, {});
+  ASSERT_EQ(sweep.rows.size(), 4u);
+  for (const ThresholdRow& row : sweep.rows) {
+    ASSERT_TRUE(row.set.dimensions && row.boundary.dimensions);
+    const double radius = (255.0 - row.threshold) / 0.85;
+    EXPECT_NEAR(row.foreground_share, maths::kPi * radius * radius / 360'000.0, 0.01);
+    EXPECT_EQ(row.boundary.dimensions->counts.size(), sweep.sides_px.size());
+    EXPECT_NEAR(row.boundary.dimensions->capacity.value, 1.0, 0.1);
+    EXPECT_GT(row.set.dimensions->capacity.value, 1.7);
+  }
+  const ThresholdSweep dark = *threshold_sweep(cone, {40}, true, {});
+  EXPECT_NEAR(dark.rows[0].foreground_share + sweep.rows[0].foreground_share, 1.0, 1e-12);
+  const ThresholdSweep all = *threshold_sweep(GreyImage(600, 600, {}, 255), {1}, false, {});
+  EXPECT_NE(all.rows[0].set.reason.find("nothing but foreground"), std::string::npos);
+  EXPECT_EQ(threshold_sweep(cone, {}, false, {}).error().fields.front().pointer, "thresholds");
+  EXPECT_EQ(threshold_sweep(cone, {5, 5}, false, {}).error().fields.front().pointer, "thresholds");
+  EXPECT_EQ(threshold_sweep(cone, {256}, false, {}).error().fields.front().pointer, "thresholds");
+  EXPECT_EQ(threshold_sweep(GreyImage(20, 20), {5}, false, {}).error().fields.front().pointer, "image");
+}
+
+}  // namespace
+}  // namespace colony
