@@ -11,12 +11,13 @@ packages=(
   libboost1.81-dev          # server/http: Asio, Beast (the default 1.74 is too old)
   nlohmann-json3-dev        # server/api, client
   libeigen3-dev librandom123-dev libxxhash-dev libhwy-dev libspng-dev libtbb-dev   # engine
-  libtiff-dev zlib1g-dev    # engine/picture: OME-TIFF
-  libopencv-core-dev libopencv-imgproc-dev                   # engine/analysis, engine/picture: standard morphology
+  libtiff-dev zlib1g-dev libturbojpeg0-dev libopencv-core-dev libopencv-imgproc-dev   # engine/analysis: real images; engine/picture: OME-TIFF
   libsqlite3-dev sqlite3                                     # server/store; the shell reads the database in the tests
   libspdlog-dev libtomlplusplus-dev                          # server
+  libtinygltf-dev                                            # server/api: meshes as GLB
   libcli11-dev libcurl4-openssl-dev                          # client
   libgtest-dev libgmock-dev librapidcheck-dev libbenchmark-dev   # tests
+  clang-16 libclang-rt-16-dev libfuzzer-16-dev   # tests/fuzz (46 MB to fetch; clang-14 cannot compile the <ranges> of this libstdc++)
 )
 
 # The system tests need Node 18 or later; one from elsewhere is as good as Debian's and is left alone.

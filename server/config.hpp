@@ -25,6 +25,8 @@ struct Config {
   StoreConfig store;
   JobsConfig jobs;
   std::uint64_t disk_free_bytes_min = 100'000'000;  // below: /readyz says not ready
+  std::uint64_t stored_image_bytes_max = 4'000'000'000;
+  std::size_t analyses_waiting_max = 100;
 };
 
 /// Either a configuration, or a text to print before ending well (--help, --version).

@@ -86,6 +86,9 @@ int serve(const Config& config) {
   api_config.connections_max = config.http.connections_max;
   api_config.base_path = config.http.base_path;
   api_config.disk_free_bytes_min = config.disk_free_bytes_min;
+  api_config.image_bytes_max = config.http.large_body_bytes_max;
+  api_config.stored_image_bytes_max = config.stored_image_bytes_max;
+  api_config.analyses_waiting_max = config.analyses_waiting_max;
   api::Api api(*jobs, api_config);
   http::Router router;
   api.add_routes(router);
@@ -93,13 +96,16 @@ int serve(const Config& config) {
     spdlog::error("{} {} [{}]: {}", request.method, request.path, request.request_id, what);
   });
 
-  auto server = http::Server::create(config.http, router, [](const http::AccessRecord& record) {
+  http::ServerConfig http_config = config.http;
+  http_config.large_body_path = "/v1/analyses";
+  auto server = http::Server::create(http_config, router, [](const http::AccessRecord& record) {
     spdlog::info("{} {} {} {} us {} B [{}]", record.method, record.path, record.status, record.duration_us,
                  record.body_bytes, record.request_id);
   });
   if (!server) return fail("cannot listen", server.error());
   // Only now: a process that cannot serve must not take up jobs.
   if (const Status started = jobs->start(); !started) return fail("cannot take up the jobs", started.error());
+  if (const Status started = api.start(); !started) return fail("cannot take up the analyses", started.error());
   (*server)->run();
   const bool is_v6 = config.http.address.find(':') != std::string::npos;
   const std::string host = is_v6 ? "[" + config.http.address + "]" : config.http.address;

@@ -62,6 +62,8 @@ int run(const std::vector<std::string>& arguments, Environment& env) {
   add_job_commands(app, session, action);
   add_data_commands(app, session, action);
   add_picture_commands(app, session, action);
+  add_measure_commands(app, session, action);
+  add_report_command(app, session, action);
   add_founders_command(app, session, action);
 
   ExitCode code = ExitCode::kDone;

@@ -19,6 +19,8 @@ void add_submit_command(CLI::App& app, Session& session, Action& action);
 void add_watch_command(CLI::App& app, Session& session, Action& action);
 void add_data_commands(CLI::App& app, Session& session, Action& action);     // events cells log
 void add_picture_commands(CLI::App& app, Session& session, Action& action);  // series image
+void add_measure_commands(CLI::App& app, Session& session, Action& action);  // lineage mesh measure analyze compare
+void add_report_command(CLI::App& app, Session& session, Action& action);
 void add_founders_command(CLI::App& app, Session& session, Action& action);
 
 /// Follows a job to its end. Exit code: kDone, kJobFailed or kCancelled by its state; kInterrupted leaves it running.

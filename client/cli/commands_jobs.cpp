@@ -109,7 +109,7 @@ ExitCode command_job(Session& session, const std::string& text, const std::strin
   HttpRequest request;
   request.method = "POST";
   request.target = job_target(id, "/" + verb).text();
-  request.json_body = "";  // the server wants the content type of every POST; it has no body to read
+  request.body = "";  // the server wants the content type of every POST; it has no body to read
   const HttpResponse response = session.client().send(request);
   require_ok(response);
   if (session.json) {

@@ -74,8 +74,8 @@ ExitCode show_series(Session& session, const SeriesOptions& options) {
 
 struct ImageOptions {
   std::string id, output;
-  std::optional<std::string> at_h, style, width_px, um_per_px, colour_by;
-  bool no_scale_bar = false;
+  std::optional<std::string> at_h, style, width_px, um_per_px, colour_by, lines;
+  bool no_scale_bar = false, tiff = false;
 };
 
 ExitCode fetch_image(Session& session, const ImageOptions& options) {
@@ -90,10 +90,11 @@ ExitCode fetch_image(Session& session, const ImageOptions& options) {
       .add_if("style", options.style)
       .add_if("width_px", options.width_px)
       .add_if("um_per_px", options.um_per_px)
-      .add_if("colour_by", options.colour_by);
+      .add_if("colour_by", options.colour_by)
+      .add_if("lines", options.lines);
   if (options.no_scale_bar) target.add("scale_bar", "false");
   request.target = target.text();
-  request.accept = "image/png";
+  request.accept = options.tiff ? "image/tiff" : "image/png";
   Output output(session.env, options.output);
   const HttpResponse response = session.client().receive(request, [&](std::string_view bytes) { output.write(bytes); });
   require_ok(response);
@@ -118,11 +119,13 @@ void add_picture_commands(CLI::App& app, Session& session, Action& action) {
       [&session, &action, series] { action = [&session, series] { return show_series(session, *series); }; });
 
   auto image = std::make_shared<ImageOptions>();
-  command = app.add_subcommand("image", "The colony from above, as PNG");
+  command = app.add_subcommand("image", "The colony from above, as PNG or OME-TIFF");
   command->add_option("ID", image->id, "Job id, or its unique end")->required();
   command->add_option("-o,--output", image->output, "File; it appears whole or not at all");
   command->add_option("--at-h", image->at_h, "Model time, h (default: now, or the end)");
-  command->add_option("--style", image->style, "shaded or contours");
+  command->add_option("--style", image->style, "shaded, contours, brightfield, phase or labels");
+  command->add_option("--lines", image->lines, "Which borders contours draws: both, colony or cells");
+  command->add_flag("--tiff", image->tiff, "OME-TIFF with all channels (brightfield, phase, nuclei, labels) instead of PNG");
   command->add_option("--width-px", image->width_px, "Width of the picture");
   command->add_option("--um-per-px", image->um_per_px, "Scale of the picture (instead of its width)");
   command->add_option("--colour-by", image->colour_by, "What the colours show: activity, generation, age or volume");

@@ -79,7 +79,7 @@ ExitCode submit(Session& session, const SubmitOptions& options) {
   HttpRequest request;
   request.method = "POST";
   request.target = "/v1/jobs";
-  request.json_body = spec_body(session, options);
+  request.body = spec_body(session, options);
   if (options.dry_run) return dry_run(session, request);
 
   const std::string key = options.key ? *options.key : random_key();

@@ -152,7 +152,7 @@ HttpResponse HttpClient::receive(const HttpRequest& request, const Sink& sink, s
   Headers headers(nullptr, curl_slist_free_all);
   append(headers, "Accept: " + request.accept);
   append(headers, "Expect:");  // a spec is small: do not wait for permission to send it
-  if (request.json_body) append(headers, "Content-Type: application/json");
+  if (request.body) append(headers, "Content-Type: " + request.body_type);
   if (!settings_.token.empty()) append(headers, "Authorization: Bearer " + settings_.token);
   for (const auto& [name, value] : request.headers) append(headers, name + ": " + value);
 
@@ -174,10 +174,10 @@ HttpResponse HttpClient::receive(const HttpRequest& request, const Sink& sink, s
   curl_easy_setopt(easy, CURLOPT_HEADERDATA, &transfer);
   if (request.method != "GET") {
     // A POST without content still says so (Content-Length: 0); curl's own POST would add a form's content type.
-    if (request.method == "POST" && !request.json_body) append(headers, "Content-Type:");
-    if (request.json_body || request.method == "POST") {
+    if (request.method == "POST" && !request.body) append(headers, "Content-Type:");
+    if (request.body || request.method == "POST") {
       const std::string empty;
-      const std::string& body = request.json_body ? *request.json_body : empty;
+      const std::string& body = request.body ? *request.body : empty;
       curl_easy_setopt(easy, CURLOPT_POSTFIELDSIZE_LARGE, static_cast<curl_off_t>(body.size()));
       curl_easy_setopt(easy, CURLOPT_COPYPOSTFIELDS, body.data());
       curl_easy_setopt(easy, CURLOPT_HTTPHEADER, headers.get());

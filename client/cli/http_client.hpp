@@ -34,10 +34,11 @@ class Target {
 
 struct HttpRequest {
   std::string method = "GET";
-  std::string target;  // starts with '/'
+  std::string target = {};  // starts with '/'
   std::string accept = "application/json";
-  std::vector<std::pair<std::string, std::string>> headers;  // besides Accept, Authorization and the body's
-  std::optional<std::string> json_body;
+  std::vector<std::pair<std::string, std::string>> headers = {};  // besides Accept, Authorization and the body's
+  std::optional<std::string> body = std::nullopt;
+  std::string body_type = "application/json";
 };
 
 struct HttpResponse {

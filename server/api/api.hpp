@@ -17,6 +17,7 @@
 #include "server/api/problems.hpp"
 #include "server/api/query.hpp"
 #include "server/http/router.hpp"
+#include "server/jobs/analysis_worker.hpp"
 #include "server/jobs/service.hpp"
 
 namespace colony::server::api {
@@ -29,6 +30,9 @@ struct ApiConfig {
   std::size_t header_bytes_max = 8 * 1024;
   std::size_t connections_max = 2000;
   std::uint64_t disk_free_bytes_min = 100'000'000;  // below: not ready
+  std::size_t image_bytes_max = 32 * 1024 * 1024;   // of one picture; the http side holds it
+  std::uint64_t stored_image_bytes_max = 4'000'000'000;  // of all pictures
+  std::size_t analyses_waiting_max = 100;           // queued or running
 };
 
 inline constexpr std::size_t kJobsPerPageMax = 500;
@@ -38,6 +42,13 @@ inline constexpr std::size_t kEventsPerPageDefault = 1000;
 inline constexpr std::size_t kSeriesPointsMax = 10'000;
 inline constexpr std::size_t kSeriesPointsDefault = 200;
 inline constexpr std::size_t kIdempotencyKeyBytesMax = 200;
+/// A picture is held in memory as its file: at most some 200 MB.
+/// Up to here a picture is analysed before the answer, beyond by the worker.
+inline constexpr std::int64_t kAnalysedAtOncePixelsMax = 4'000'000;
+inline constexpr std::int64_t kServedPictureSideMax_px = 8192;
+inline constexpr std::uint64_t kMeshTrianglesDefault = 200'000;
+inline constexpr std::int64_t kServedMeshTrianglesMax = 4'000'000;  // 50 bytes each, and the file once more
+inline constexpr std::uint32_t kPackingPoints = 1024;               // a cell's volume to 1.1 %
 /// Placing more founders than this can take long: one submission at a time may.
 inline constexpr std::uint64_t kFoundersPlacedFreely = 1000;
 
@@ -49,6 +60,7 @@ struct Context {
   std::string schema_text;            // made once
   std::string openapi_text;
   std::atomic<bool> places_many{false};  // a submission of many founders is being checked
+  std::unique_ptr<AnalysisWorker> worker = {};  // from start() on
 };
 
 /// A request that has passed the table's checks.
@@ -74,6 +86,9 @@ struct Endpoint {
   http::Response (*handler)(Context&, const Call&);
   /// Folds a history or draws: seconds for a large colony. Holds at most half of the worker threads.
   bool is_heavy = false;
+  /// What a POST takes; empty: application/json. None of them can be sent by a page of another site without asking first: only text/plain and
+  /// the two form types can (CORS safelist), so exactly these are demanded.
+  std::vector<std::string_view> body_media = {};
 };
 
 std::span<const Endpoint> endpoints();
@@ -81,10 +96,13 @@ std::span<const Endpoint> endpoints();
 class Api {
  public:
   Api(JobService& jobs, ApiConfig config);
+  ~Api();
+  /// Takes up analyses that are queued. Before it, and without it, they wait.
+  Status start();
   /// The router keeps references to this object.
   void add_routes(http::Router& router);
   /// From now on /readyz answers 503, and what takes long gives up and is answered with 503.
-  void drain() { context_->draining = true; }
+  void drain();
 
  private:
   std::unique_ptr<Context> context_;
@@ -109,8 +127,21 @@ http::Response delete_job(Context& context, const Call& call);
 http::Response get_events(Context& context, const Call& call);
 http::Response get_cells(Context& context, const Call& call);
 http::Response get_series(Context& context, const Call& call);
+http::Response get_lineage(Context& context, const Call& call);
+http::Response get_mesh(Context& context, const Call& call);
+http::Response get_analysis_of_job(Context& context, const Call& call);
 http::Response get_image(Context& context, const Call& call);
 http::Response get_log(Context& context, const Call& call);
+http::Response post_analysis(Context& context, const Call& call);
+http::Response get_analyses(Context& context, const Call& call);
+http::Response get_analysis(Context& context, const Call& call);
+http::Response delete_analysis(Context& context, const Call& call);
+http::Response get_analysis_step(Context& context, const Call& call);
+http::Response post_comparison(Context& context, const Call& call);
+http::Response get_comparisons(Context& context, const Call& call);
+http::Response get_comparison(Context& context, const Call& call);
+http::Response delete_comparison(Context& context, const Call& call);
+http::Response get_comparison_figure(Context& context, const Call& call);
 http::Response get_job_schema(Context& context, const Call& call);
 http::Response get_openapi(Context& context, const Call& call);
 http::Response get_service_info(Context& context, const Call& call);

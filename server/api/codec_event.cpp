@@ -121,6 +121,9 @@ Json encode_job(const JobView& view) {
             {"cells", self + "/cells"},
             {"series", self + "/series"},
             {"image", self + "/image"},
+            {"mesh", self + "/mesh"},
+            {"analysis", self + "/analysis"},
+            {"lineage", self + "/lineage"},
             {"log", self + "/log"}}}};
 }
 

@@ -35,10 +35,7 @@ void check_names(const Json& object, const std::string& pointer, std::span<const
 void decode_name(const Json& json, JobSpec& spec, Errors& errors) {
   if (!json.is_string()) return errors.push_back({"/name", "must be a string"});
   const std::string& name = json.get_ref<const std::string&>();
-  if (code_point_count(name) > kNameCharactersMax) {
-    return errors.push_back({"/name", "must have at most " + std::to_string(kNameCharactersMax) + " characters"});
-  }
-  if (has_control_character(name)) return errors.push_back({"/name", "must not contain control characters"});
+  if (std::string wrong = name_error(name); !wrong.empty()) return errors.push_back({"/name", std::move(wrong)});
   spec.name = name;
 }
 
@@ -143,6 +140,13 @@ Result<JobSpec> decode(const Json& body, const SpecLimits* limits) {
 }
 
 }  // namespace
+
+std::string name_error(std::string_view name) {
+  if (code_point_count(name) > kNameCharactersMax) {
+    return "must have at most " + std::to_string(kNameCharactersMax) + " characters";
+  }
+  return has_control_character(name) ? "must not contain control characters" : "";
+}
 
 std::string label_key_error(std::string_view key) {
   const bool right = !key.empty() && key.size() <= kLabelKeyBytesMax && std::all_of(key.begin(), key.end(), [](char c) {

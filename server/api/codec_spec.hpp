@@ -56,6 +56,8 @@ Result<RunSpec> decode_stored_spec(const std::string& spec_json);
 /// What the store keeps of a spec.
 NewJob new_job(const JobSpec& spec);
 
+/// A name of a job, analysis or comparison; as below.
+std::string name_error(std::string_view name);
 /// One label key or value; an empty string if it is right, else why not.
 std::string label_key_error(std::string_view key);
 std::string label_value_error(std::string_view value);

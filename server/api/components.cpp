@@ -1,7 +1,9 @@
 // The schemas of everything that comes out (components/schemas of openapi.json).
 #include <array>
 
+#include "server/api/codec_analysis.hpp"
 #include "server/api/codec_event.hpp"
+#include "server/api/codec_report.hpp"
 #include "server/api/problems.hpp"
 #include "server/api/schema.hpp"
 
@@ -119,7 +121,27 @@ Json job_schema() {
        {"progress", reference("Progress")},
        {"links",
         strict_object(
-            {{"self", path}, {"events", path}, {"cells", path}, {"series", path}, {"image", path}, {"log", path}})}});
+            {{"self", path}, {"events", path}, {"cells", path}, {"series", path}, {"image", path}, {"mesh", path},
+             {"analysis", path}, {"lineage", path}, {"log", path}})}});
+}
+
+Json lineage_schema() {
+  const Json parent = {{"type", Json::array({"integer", "null"})}, {"minimum", 1}, {"maximum", kCellIdMax}};
+  Json born_h = typed("number");
+  born_h["description"] = "when the id came into being: placed, or split off its parent";
+  Json daughters = {{"type", "array"}, {"items", cell_id()}};
+  daughters["description"] = "one for each division of this id, in the order of time";
+  Json item = strict_object({{"cell_id", cell_id()},
+                             {"parent_id", parent},
+                             {"born_h", std::move(born_h)},
+                             {"generation", count()},
+                             {"activity", names_upto(Activity::kSenescent)},
+                             {"daughter_ids", std::move(daughters)}});
+  return strict_object({{"time_h", typed("number")},
+                        {"last_seq", count()},
+                        {"digest", digest()},
+                        {"items", {{"type", "array"}, {"items", std::move(item)}}},
+                        {"next", typed("null")}});
 }
 
 Json progress_schema() {
@@ -202,7 +224,7 @@ Json component_schemas(const SpecLimits& limits) {
   Json activity = names_upto(Activity::kSenescent);
   Json cell = row_schema(cell_columns());
   cell["properties"]["activity"] = std::move(activity);
-  return {
+  Json components = {
       {"JobSpec", std::move(job_spec)},
       {"Spec", spec_schema(limits)},
       {"Job", job_schema()},
@@ -216,6 +238,7 @@ Json component_schemas(const SpecLimits& limits) {
                                   {"digest", digest()},
                                   {"items", list_of("Cell")},
                                   {"next", typed("null")}})},
+      {"Lineage", lineage_schema()},
       {"Woken", strict_object({{"cell_id", cell_id()}, {"free_share", typed("number")}, {"due_h", typed("number")}})},
       {"Event", event_union()},
       {"EventList", page_of("Event", {{"type", Json::array({"string", "null"})}, {"pattern", "^[0-9]+$"}})},
@@ -228,6 +251,9 @@ Json component_schemas(const SpecLimits& limits) {
       {"ServiceInfo", service_info_schema()},
       {"Health", strict_object({{"status", typed("string")}})},
       {"Problem", problem_schema()}};
+  components.update(report_components());
+  components.update(analysis_components());
+  return components;
 }
 
 }  // namespace colony::server::api

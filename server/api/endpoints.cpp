@@ -1,7 +1,9 @@
 // The table of operations, and what is checked before any handler runs.
 #include "engine/base/stop.hpp"
-#include "engine/picture/render.hpp"
+#include "engine/picture/mesh.hpp"
+#include "server/api/analysis_work.hpp"
 #include "server/api/api.hpp"
+#include "server/api/measure.hpp"
 #include "server/api/openapi.hpp"
 #include "server/api/schema.hpp"
 
@@ -15,6 +17,10 @@ constexpr std::string_view kCsv = "text/csv";
 
 const QueryParam kAtH = {
     "at_h", QueryType::kNumber, 0, 1e9, {}, "model time, h: the state after all events up to it; default now"};
+
+const QueryParam kLimitParam = {
+    "limit", QueryType::kInteger, 1, kJobsPerPageMax, {}, "items in a page; default 50"};
+const QueryParam kCursorParam = {"cursor", QueryType::kText, 0, 0, {}, "`next` of the page before"};
 
 std::vector<std::string_view> stream_kinds() {
   std::vector<std::string_view> names;
@@ -157,20 +163,59 @@ std::vector<Endpoint> make_endpoints() {
        get_series,
        true},
       {"GET",
+       "/v1/jobs/{job_id}/lineage",
+       "showLineage",
+       "Who came from whom: a table, or Newick trees (one a founder; leaves named by cell id, branch lengths in h)",
+       {kJson, "text/x-newick", "text/plain"},
+       {kAtH},
+       {{200, "the lineage"}},
+       "Lineage",
+       {kNotFound, kTimeNotReached},
+       get_lineage,
+       true},
+      {"GET",
        "/v1/jobs/{job_id}/image",
        "drawImage",
-       "A picture of the colony from above",
-       {"image/png"},
+       "A picture of the colony from above; as image/tiff an OME-TIFF with the channels brightfield, phase, nuclei, labels",
+       {"image/png", "image/tiff"},
        {kAtH,
-        {"style", QueryType::kName, 0, 0, {"shaded", "contours"}, "default shaded"},
+        {"style", QueryType::kName, 0, 0, {"shaded", "contours", "brightfield", "phase", "labels"}, "default shaded"},
         {"um_per_px", QueryType::kNumber, 0.01, 1000, {}, "scale; not together with width_px"},
-        {"width_px", QueryType::kInteger, 16, kPictureSideMax_px, {}, "width; default 1024"},
-        {"colour_by", QueryType::kName, 0, 0, {"activity", "generation", "age", "volume"}, "default activity"},
+        {"width_px", QueryType::kInteger, 16, kServedPictureSideMax_px, {}, "width; default 1024"},
+        {"colour_by", QueryType::kName, 0, 0, {"activity", "generation", "age", "volume"},
+         "of shaded; default activity"},
+        {"lines", QueryType::kName, 0, 0, {"both", "colony", "cells"}, "which borders contours draws; default both"},
         {"scale_bar", QueryType::kBoolean, 0, 0, {}, "default true"}},
        {{200, "the picture"}},
        "",
-       {kNotFound, kTimeNotReached},
+       {kNotFound, kTimeNotReached, kLimit},
        get_image,
+       true},
+      {"GET",
+       "/v1/jobs/{job_id}/mesh",
+       "getMesh",
+       "The surfaces of all cells and nuclei as binary glTF; neighbours share their contact faces exactly; 1 unit = 1 um",
+       {"model/gltf-binary"},
+       {kAtH,
+        {"triangles_max", QueryType::kInteger, kTrianglesMin, kServedMeshTrianglesMax, {}, "most triangles; default 200000"},
+        {"nuclei", QueryType::kBoolean, 0, 0, {}, "default true"}},
+       {{200, "the mesh"}},
+       "",
+       {kNotFound, kTimeNotReached, kLimit},
+       get_mesh,
+       true},
+      {"GET",
+       "/v1/jobs/{job_id}/analysis",
+       "measureJob",
+       "Measurements of the colony at a time, with controls beside each answer and words that say what follows",
+       {kJson},
+       {kAtH,
+        {"um_per_px", QueryType::kNumber, 0.01, 1000, {}, "scale of the measured picture; not together with width_px"},
+        {"width_px", QueryType::kInteger, 64, kMeasuredSideMax_px, {}, "its width; default 2048"}},
+       {{200, "the measurements"}},
+       "JobAnalysis",
+       {kNotFound, kTimeNotReached, kLimit},
+       get_analysis_of_job,
        true},
       {"GET",
        "/v1/jobs/{job_id}/log",
@@ -182,6 +227,118 @@ std::vector<Endpoint> make_endpoints() {
        "LogLine",
        {kNotFound},
        get_log},
+      {"POST",
+       "/v1/analyses",
+       "analyseImage",
+       "Analyse a picture: the body is a PNG, TIFF or JPEG. Up to 4,000,000 pixels the answer has the result, beyond it is made later",
+       {kJson},
+       {{"name", QueryType::kText, 0, 0, {}, "a name for people"},
+        {"um_per_px", QueryType::kNumber, kImageScaleMin_um_per_px, kImageScaleMax_um_per_px, {},
+         "size of a pixel; without it lengths are in pixels"},
+        {"foreground", QueryType::kName, 0, 0, {"auto", "light", "dark"}, "what the objects are; default auto"},
+        {"channel", QueryType::kInteger, 0, 15, {}, "from 0; an image of several channels needs one"},
+        {"threshold", QueryType::kInteger, 0, 254, {}, "of the step `signal`; default by Otsu"},
+        {"pipeline", QueryType::kName, 0, 0, {"auto", "nuclei", "phase", "contours"}, "default auto"},
+        {"clahe", QueryType::kBoolean, 0, 0, {}, "even the local contrast first; default false"}},
+       {{201, "the analysis with its result"}, {202, "the analysis, to be worked on"}},
+       "Analysis",
+       {kMalformed, kUnsupportedMediaType, kLimit, kBusy},
+       post_analysis,
+       true,
+       {"image/png", "image/tiff", "image/jpeg"}},
+      {"GET",
+       "/v1/analyses",
+       "listAnalyses",
+       "Analyses, newest first, without their results",
+       {kJson},
+       {kLimitParam, kCursorParam},
+       {{200, "a page"}},
+       "AnalysisList",
+       {},
+       get_analyses},
+      {"GET",
+       "/v1/analyses/{analysis_id}",
+       "showAnalysis",
+       "One analysis with its result",
+       {kJson},
+       {},
+       {{200, "the analysis"}},
+       "Analysis",
+       {kNotFound},
+       get_analysis},
+      {"DELETE",
+       "/v1/analyses/{analysis_id}",
+       "deleteAnalysis",
+       "Remove an analysis with its picture",
+       {},
+       {},
+       {{204, "it is gone"}},
+       "",
+       {kNotFound},
+       delete_analysis},
+      {"GET",
+       "/v1/analyses/{analysis_id}/steps/{step}",
+       "drawStep",
+       "One step of the analysis as a picture, made again",
+       {"image/png"},
+       {},
+       {{200, "the picture"}},
+       "",
+       {kMalformed, kNotFound, kLimit},
+       get_analysis_step,
+       true},
+      {"POST",
+       "/v1/comparisons",
+       "compare",
+       "Compare a job at a time with an analysed picture, pixels per cell matched",
+       {kJson},
+       {},
+       {{201, "the comparison with its result"}, {202, "the comparison, to be worked on"}},
+       "Comparison",
+       {kMalformed, kUnsupportedMediaType, kTimeNotReached, kLimit, kBusy},
+       post_comparison,
+       true},
+      {"GET",
+       "/v1/comparisons",
+       "listComparisons",
+       "Comparisons, newest first, without their results",
+       {kJson},
+       {kLimitParam, kCursorParam},
+       {{200, "a page"}},
+       "ComparisonList",
+       {},
+       get_comparisons},
+      {"GET",
+       "/v1/comparisons/{comparison_id}",
+       "showComparison",
+       "One comparison with its result",
+       {kJson},
+       {},
+       {{200, "the comparison"}},
+       "Comparison",
+       {kNotFound},
+       get_comparison},
+      {"DELETE",
+       "/v1/comparisons/{comparison_id}",
+       "deleteComparison",
+       "Remove a comparison",
+       {},
+       {},
+       {{204, "it is gone"}},
+       "",
+       {kNotFound},
+       delete_comparison},
+      {"GET",
+       "/v1/comparisons/{comparison_id}/figure",
+       "drawComparison",
+       "Contours and log-log plots of both, side by side, made again",
+       {"image/png"},
+       {},
+       {{200, "the figure"}},
+       "",
+       {kMalformed, kNotFound, kTimeNotReached, kLimit},
+       get_comparison_figure,
+       true},
       {"GET",
        "/v1/schema/job",
        "getJobSchema",
@@ -248,11 +405,14 @@ http::Response run_endpoint(const Endpoint& endpoint, Context& context, const ht
     media = endpoint.media[*chosen];
   }
   // Asked of every POST, with a body or without: a page of another site cannot send this type unasked (CORS).
-  if (endpoint.method == "POST" && !has_json_body(request.headers)) {
+  const bool takes_json = endpoint.body_media.empty();
+  if (endpoint.method == "POST" &&
+      !(takes_json ? has_json_body(request.headers) : has_body_of(request.headers, endpoint.body_media))) {
+    const std::string wanted = takes_json ? "application/json" : "one of " + joined(endpoint.body_media);
     return problem_response(ProblemKind::kUnsupportedMediaType,
                             {ErrorCode::kInvalid,
-                             "a POST must have Content-Type: application/json",
-                             {{"Content-Type", "must be application/json"}}},
+                             "this POST must have the Content-Type " + wanted,
+                             {{"Content-Type", "must be " + wanted}}},
                             request.request_id);
   }
   try {
@@ -272,11 +432,25 @@ Api::Api(JobService& jobs, ApiConfig config) {
       to_text(openapi_document(endpoints(), limits, context_->config.version, context_->config.base_path));
 }
 
+Api::~Api() { drain(); }
+
+Status Api::start() {
+  context_->worker = std::make_unique<AnalysisWorker>(
+      context_->jobs.store().analyses(),
+      [context = context_.get()](const AnalysisRow& row, StopFlag stop) { return work_on(*context, row, stop); });
+  return context_->worker->start();
+}
+
+void Api::drain() {
+  context_->draining = true;
+  if (context_->worker) context_->worker->stop();
+}
+
 void Api::add_routes(http::Router& router) {
   for (const Endpoint& endpoint : endpoints()) {
     std::string pattern(endpoint.path);
-    if (const std::size_t open = pattern.find('{'); open != std::string::npos) {
-      pattern.replace(open, pattern.find('}') - open + 1, "{}");
+    for (std::size_t open = pattern.find('{'); open != std::string::npos; open = pattern.find('{', open + 1)) {
+      pattern.replace(open, pattern.find('}', open) - open + 1, "{}");
     }
     router.add(std::string(endpoint.method), pattern,
                [&endpoint, context = context_.get()](const http::Request& request) {

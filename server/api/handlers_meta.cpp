@@ -1,6 +1,7 @@
 // Handlers of what the server says about itself.
 #include "engine/picture/render.hpp"
 #include "server/api/api.hpp"
+#include "server/api/measure.hpp"
 #include "server/api/codec_model.hpp"
 #include "server/api/schema.hpp"
 
@@ -55,13 +56,18 @@ http::Response get_service_info(Context& context, const Call&) {
                                {"cells_max", config.jobs.cells_max},
                                {"events_max", config.jobs.events_max},
                                {"body_bytes_max", config.body_bytes_max},
+                               {"image_bytes_max", config.image_bytes_max},
+                               {"stored_image_bytes_max", config.stored_image_bytes_max},
+                               {"analyses_waiting_max", config.analyses_waiting_max},
                                {"header_bytes_max", config.header_bytes_max},
                                {"connections_max", config.connections_max},
                                {"json_depth_max", kJsonDepthMax},
                                {"jobs_per_page_max", kJobsPerPageMax},
                                {"events_per_page_max", kEventsPerPageMax},
                                {"series_points_max", kSeriesPointsMax},
-                               {"picture_side_max_px", kPictureSideMax_px},
+                               {"picture_side_max_px", kServedPictureSideMax_px},
+                               {"mesh_triangles_max", kServedMeshTrianglesMax},
+                               {"measured_side_max_px", kMeasuredSideMax_px},
                                {"labels_max", kLabelsMax},
                                {"seed_max", kSeedMax},
                                {"until_time_max_h", kUntilTimeMax_h}}},

@@ -1,10 +1,10 @@
-// Handlers of what a job has produced: events, cells, series, image, log.
+// Handlers of what a job has produced: events, cells, series, lineage, log.
 #include <algorithm>
 #include <limits>
 
-#include "engine/picture/render.hpp"
 #include "server/api/api.hpp"
 #include "server/api/codec_event.hpp"
+#include "server/api/lineage.hpp"
 #include "server/api/streams.hpp"
 
 namespace colony::server::api {
@@ -75,12 +75,6 @@ http::Response live_stream(Context& context, const Call& call, StreamWish wish) 
   return response;
 }
 
-template <class Enum>
-Enum enum_of(const Query& query, std::string_view name, std::initializer_list<std::string_view> names) {
-  const std::string value = query.text(name).value_or(std::string(*names.begin()));
-  return static_cast<Enum>(std::find(names.begin(), names.end(), value) - names.begin());
-}
-
 }  // namespace
 
 http::Response get_events(Context& context, const Call& call) {
@@ -122,27 +116,16 @@ http::Response get_series(Context& context, const Call& call) {
   return json_response(200, {{"items", std::move(items)}, {"next", nullptr}});
 }
 
-http::Response get_image(Context& context, const Call& call) {
-  if (call.query.has("um_per_px") && call.query.has("width_px")) {
-    return failure({ErrorCode::kInvalid,
-                    "query parameters are wrong",
-                    {{"um_per_px", "not together with width_px"}, {"width_px", "not together with um_per_px"}}},
-                   call);
-  }
-  PictureSpec spec;
-  spec.style = enum_of<PictureStyle>(call.query, "style", {"shaded", "contours"});
-  spec.colour_by = enum_of<ColourBy>(call.query, "colour_by", {"activity", "generation", "age", "volume"});
-  spec.um_per_px = call.query.number("um_per_px").value_or(0.0);
-  if (const auto width = call.query.integer("width_px")) spec.width_px = static_cast<std::int64_t>(*width);
-  spec.scale_bar = call.query.boolean("scale_bar", true);
-  const auto at = context.jobs.colony_at(call.id(), call.query.number("at_h"));
+http::Response get_lineage(Context& context, const Call& call) {
+  auto at = context.jobs.colony_at(call.id(), call.query.number("at_h"));
   if (!at) return failure(at.error(), call);
-  const auto picture = render(*at->colony, at->spec->params, spec, &context.draining);
-  if (!picture) return failure(picture.error(), call);
-  http::Response response;
-  response.headers.set("Content-Type", "image/png");
-  response.body = encode_png(*picture);
-  return response;
+  auto lineage = read_lineage(context.jobs, call.id(), at->colony->last_seq(), &context.draining);
+  if (!lineage) return failure(lineage.error(), call);
+  if (call.media != "application/json") {
+    return streamed(call.media, std::make_unique<NewickSource>(std::move(*lineage), at->time_h));
+  }
+  const Json facts = {{"time_h", at->time_h}, {"last_seq", at->colony->last_seq()}, {"digest", at->digest.hex()}};
+  return streamed(call.media, std::make_unique<LineageTableSource>(std::move(*lineage), at->colony, facts));
 }
 
 http::Response get_log(Context& context, const Call& call) {

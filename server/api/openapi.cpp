@@ -39,6 +39,12 @@ Json parameters_of(const Endpoint& endpoint) {
   Json parameters = Json::array();
   if (endpoint.path.find("{job_id}") != std::string_view::npos)
     parameters.push_back({{"$ref", "#/components/parameters/job_id"}});
+  for (std::size_t open = endpoint.path.find('{'); open != std::string_view::npos;
+       open = endpoint.path.find('{', open + 1)) {
+    const std::string name(endpoint.path.substr(open + 1, endpoint.path.find('}', open) - open - 1));
+    if (name == "job_id") continue;
+    parameters.push_back({{"name", name}, {"in", "path"}, {"required", true}, {"schema", {{"type", "string"}}}});
+  }
   for (const QueryParam& param : endpoint.query) {
     Json one = {{"name", param.name}, {"in", "query"}, {"description", param.text}, {"schema", query_schema(param)}};
     if (param.type == QueryType::kNames) {
@@ -74,7 +80,9 @@ Json media_schema(const Endpoint& endpoint, std::string_view media) {
     if (endpoint.schema.empty()) return {{"type", "object"}};
     return reference(endpoint.schema);
   }
-  if (media == "image/png") return {{"type", "string"}, {"contentMediaType", "image/png"}};
+  if (media.starts_with("image/") || media.starts_with("model/")) {
+    return {{"type", "string"}, {"contentMediaType", media}};
+  }
   return {{"type", "string"}};
 }
 
@@ -89,6 +97,11 @@ Json success_answer(const Endpoint& endpoint, int status, std::string_view descr
     answer["headers"][name] = {{"description", text}, {"schema", {{"type", "string"}}}};
   };
   if (endpoint.operation_id == "submitJob") header("Location", "path of the job");
+  if (status == 201 || status == 202) {
+    if (endpoint.operation_id == "analyseImage" || endpoint.operation_id == "compare") {
+      header("Location", "path of what was made");
+    }
+  }
   if (endpoint.operation_id == "listJobs") header("Link", "rel=next, if there is a next page");
   return answer;
 }
@@ -133,6 +146,16 @@ Json responses_of(const Endpoint& endpoint) {
 Json request_body_of(const Endpoint& endpoint) {
   if (endpoint.operation_id == "submitJob") {
     return {{"required", true}, {"content", {{"application/json", {{"schema", reference("JobSpec")}}}}}};
+  }
+  if (endpoint.operation_id == "compare") {
+    return {{"required", true}, {"content", {{"application/json", {{"schema", reference("ComparisonSpec")}}}}}};
+  }
+  if (!endpoint.body_media.empty()) {
+    Json content = Json::object();
+    for (const std::string_view media : endpoint.body_media) {
+      content[std::string(media)] = {{"schema", {{"type", "string"}, {"contentMediaType", media}}}};
+    }
+    return {{"required", true}, {"content", std::move(content)}};
   }
   return {{"description", "empty, or an empty object"},
           {"content", {{"application/json", {{"schema", {{"type", "object"}, {"maxProperties", 0}}}}}}}};

@@ -22,7 +22,7 @@ constexpr std::array<ProblemRow, 15> kTable = {{
     {ProblemKind::kStorage, 503, "storage", "The storage refused", 10},
     {ProblemKind::kUnavailable, 503, "unavailable", "The server is not ready", 5},
     {ProblemKind::kInternal, 500, "internal", "A bug in the server", 0},
-    {ProblemKind::kUnsupportedMediaType, 415, "unsupported-media-type", "The body must be application/json", 0},
+    {ProblemKind::kUnsupportedMediaType, 415, "unsupported-media-type", "The body is of another type than this takes", 0},
     {ProblemKind::kNotAcceptable, 406, "not-acceptable", "None of the accepted media types is offered", 0},
 }};
 

@@ -176,6 +176,11 @@ std::optional<std::size_t> choose_media(const http::Headers& headers, std::span<
   return chosen;
 }
 
+bool has_body_of(const http::Headers& headers, std::span<const std::string_view> media) {
+  return headers.count("Content-Type") == 1 &&
+         std::find(media.begin(), media.end(), *headers.get("Content-Type")) != media.end();
+}
+
 bool has_json_body(const http::Headers& headers) {
   if (headers.count("Content-Type") != 1) return false;
   const std::vector<std::string> parts = split(*headers.get("Content-Type"), ';');

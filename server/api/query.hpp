@@ -56,5 +56,7 @@ std::string joined(std::span<const std::string_view> names);
 std::optional<std::size_t> choose_media(const http::Headers& headers, std::span<const std::string_view> offered);
 /// True if the request has exactly one Content-Type, application/json, with at most the parameter charset=utf-8.
 bool has_json_body(const http::Headers& headers);
+/// True if the request has exactly one Content-Type, one of `media` without parameters.
+bool has_body_of(const http::Headers& headers, std::span<const std::string_view> media);
 
 }  // namespace colony::server::api

@@ -164,10 +164,16 @@ Check read_addressee(std::string_view target, const GatePolicy& policy, RequestH
 }
 
 Check read_expectation(const GatePolicy& policy, RequestHead& head) {
-  if (head.content_length.value_or(0) > policy.body_bytes_max) {
-    return Refusal{413, "body-too-large", "The body is too large",
-                   "the body may have at most " + std::to_string(policy.body_bytes_max) + " bytes"};
+  head.body_bytes_max = policy.body_bytes_max;
+  if (head.method == "POST" && !policy.large_body_path.empty() && head.target.path == policy.large_body_path) {
+    head.body_bytes_max = std::max(policy.body_bytes_max, policy.large_body_bytes_max);
   }
+  if (head.content_length.value_or(0) > head.body_bytes_max) {
+    return Refusal{413, "body-too-large", "The body is too large",
+                   "the body may have at most " + std::to_string(head.body_bytes_max) + " bytes"};
+  }
+  head.may_be_large = head.body_bytes_max > policy.body_bytes_max &&
+                      (head.chunked || head.content_length.value_or(0) > policy.body_bytes_max);
   for (const auto& [name, value] : head.headers.all()) {
     if (!equals_without_case(name, "Expect") || head.version_minor == 0) continue;  // HTTP/1.0 knows no Expect
     if (!equals_without_case(value, "100-continue")) {

@@ -27,6 +27,8 @@ struct GatePolicy {
   std::size_t header_fields_max = 0;
   std::size_t target_bytes_max = 0;
   std::size_t body_bytes_max = 0;
+  std::string large_body_path = {};      // with the base path; a POST there may have a larger body. Empty: none
+  std::size_t large_body_bytes_max = 0;
 };
 
 struct Refusal {
@@ -61,6 +63,8 @@ struct RequestHead {
   Headers headers;
   std::optional<std::uint64_t> content_length;
   bool chunked = false;
+  std::size_t body_bytes_max = 0;   // of this request
+  bool may_be_large = false;        // its body can exceed what any request may have
   bool keep_alive = true;
   bool expects_continue = false;
   std::string request_id;  // the client's if it is acceptable, else empty

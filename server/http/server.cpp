@@ -146,6 +146,8 @@ class BeastServer final : public Server {
     policy_.header_fields_max = config_.header_fields_max;
     policy_.target_bytes_max = config_.target_bytes_max;
     policy_.body_bytes_max = config_.body_bytes_max;
+    if (!config_.large_body_path.empty()) policy_.large_body_path = config_.base_path + config_.large_body_path;
+    policy_.large_body_bytes_max = config_.large_body_bytes_max;
     return Ok{};
   }
 

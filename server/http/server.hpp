@@ -27,6 +27,9 @@ struct ServerConfig {
   std::size_t header_fields_max = 100;
   std::size_t target_bytes_max = 4096;
   std::size_t body_bytes_max = 1024 * 1024;
+  std::string large_body_path;                 // without the base path: a POST there may have
+  std::size_t large_body_bytes_max = 32 * 1024 * 1024;   // so many bytes; the empty path: no such place
+  std::size_t large_bodies_max = 8;            // held at a time, from the first byte to the answer; beyond: 503
   std::int64_t header_timeout_ms = 10'000;
   std::int64_t body_timeout_ms = 30'000;
   std::int64_t idle_timeout_ms = 60'000;

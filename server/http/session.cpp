@@ -86,11 +86,13 @@ Awaitable<void> Session::run(std::shared_ptr<Session> self) {
     self->shared_.router.report_failure(self->request_, error.what());
   }
   self->let_go_of_stream();
+  self->give_back_large_body();
   self->connection_->close();
   self->shared_.on_end(self->id_);
 }
 
 Awaitable<bool> Session::serve_one() {
+  give_back_large_body();
   head_ = RequestHead();
   request_ = Request();
   response_ = Response();
@@ -155,7 +157,21 @@ Awaitable<bool> Session::read_head() {
 // Here tokens will be checked: after the gate, so that only well-formed requests are looked at, and before the body is
 // read, so that a stranger cannot make the server hold one. In this version only loopback addresses are bound and every
 // local user is admitted.
-std::optional<Refusal> Session::admit() const { return std::nullopt; }
+// Bodies beyond the common limit are counted, too: thirty megabytes a connection would be more than the machine has.
+std::optional<Refusal> Session::admit() {
+  if (!head_.may_be_large) return std::nullopt;
+  if (shared_.large_bodies.fetch_add(1) >= shared_.config.large_bodies_max) {
+    shared_.large_bodies.fetch_sub(1);
+    return Refusal{503, "overloaded", "The server is busy",
+                   "too many large bodies are being received already; try again in a second"};
+  }
+  holds_large_body_ = true;
+  return std::nullopt;
+}
+
+void Session::give_back_large_body() {
+  if (std::exchange(holds_large_body_, false)) shared_.large_bodies.fetch_sub(1);
+}
 
 Awaitable<bool> Session::read_body() {
   std::string& input = connection_->input();
@@ -163,7 +179,7 @@ Awaitable<bool> Session::read_body() {
     const Io io = co_await connection_->write(kContinue, shared_.config.write_timeout_ms);
     if (io != Io::kDone) co_return false;
   }
-  BodyReader reader(head_, shared_.config.body_bytes_max);
+  BodyReader reader(head_, head_.body_bytes_max);
   connection_->arm(shared_.config.body_timeout_ms);
   for (;;) {
     const auto state = reader.feed(input);

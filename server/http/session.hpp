@@ -47,6 +47,7 @@ struct SessionShared {
   RequestIds& request_ids;
   std::function<void(const AccessRecord&)> log;  // may be empty
   std::function<void(std::uint64_t session_id)> on_end;
+  std::atomic<std::size_t> large_bodies{0};  // held now; at most config.large_bodies_max
 };
 
 class Session : public std::enable_shared_from_this<Session> {
@@ -74,7 +75,8 @@ class Session : public std::enable_shared_from_this<Session> {
   Awaitable<void> wait_for_stream(std::string_view farewell, Connection::Clock::time_point until);
   Awaitable<void> wait_for_worker();
 
-  std::optional<Refusal> admit() const;
+  std::optional<Refusal> admit();
+  void give_back_large_body();
   bool fill_request();
   WorkerPool::Task as_worker_task(std::function<void()> work);
   void prepare_response();
@@ -99,6 +101,7 @@ class Session : public std::enable_shared_from_this<Session> {
   Request request_;
   Response response_;
   bool keep_alive_ = false;
+  bool holds_large_body_ = false;
   std::uint64_t sent_bytes_ = 0;  // of the body
 
   bool worker_is_done_ = false;

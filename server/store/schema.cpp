@@ -160,7 +160,35 @@ INSERT INTO cell_event SELECT job_key, cell_id, seq FROM
 UPDATE job SET indexed_seq = last_seq;
 )sql";
 
-constexpr std::array<const char*, 2> kMigrations = {kVersion1, kVersion2};  // kMigrations[v] leads from version v to v + 1
+// The image has a table of its own: it is megabytes, and lists of analyses never look at it.
+constexpr const char* kVersion3 = R"sql(
+CREATE TABLE analysis (
+  analysis_key INTEGER PRIMARY KEY AUTOINCREMENT,
+  id TEXT NOT NULL UNIQUE,
+  kind TEXT NOT NULL CHECK (kind IN ('analysis', 'comparison')),
+  name TEXT NOT NULL,
+  state TEXT NOT NULL CHECK (state IN ('queued', 'running', 'succeeded', 'failed')),
+  failure_code TEXT NOT NULL,
+  detail TEXT NOT NULL,
+  created_at TEXT NOT NULL,
+  finished_at TEXT,
+  options TEXT NOT NULL,
+  media_type TEXT,
+  image_bytes INTEGER NOT NULL,
+  job_id TEXT,
+  analysis_id TEXT,
+  try_count INTEGER NOT NULL,
+  result TEXT
+) STRICT;
+CREATE INDEX analysis_by_kind ON analysis (kind, analysis_key);
+CREATE INDEX analysis_waiting ON analysis (state, analysis_key) WHERE state IN ('queued', 'running');
+CREATE TABLE analysis_image (
+  analysis_key INTEGER PRIMARY KEY,
+  bytes BLOB NOT NULL
+) STRICT;
+)sql";
+
+constexpr std::array<const char*, 3> kMigrations = {kVersion1, kVersion2, kVersion3};  // kMigrations[v] leads from version v to v + 1
 
 std::int64_t pragma(Connection& writer, const char* sql) {
   Statement statement = writer.prepare_once(sql);

@@ -8,6 +8,7 @@
 #include "server/store/connection.hpp"
 #include "server/store/data_dir.hpp"
 #include "server/store/reader_pool.hpp"
+#include "server/store/sqlite_analyses.hpp"
 #include "server/store/store.hpp"
 #include "server/store/writer.hpp"
 
@@ -41,6 +42,8 @@ class SqliteStore final : public Store {
   Status add_log(std::int64_t job_key, const std::string& level, const std::string& message) override;
   Result<std::vector<LogRow>> read_log(std::int64_t job_key, std::int64_t after_index, std::size_t limit) override;
 
+  AnalysisStore& analyses() override { return *analyses_; }
+
   Status check_writable(std::uint64_t free_bytes_min) override;
 
  private:
@@ -54,6 +57,7 @@ class SqliteStore final : public Store {
   const std::unique_ptr<Connection> write_connection_;  // the writer thread's
   std::unique_ptr<ReaderPool> readers_;                 // synchronises itself
   std::unique_ptr<Writer> writer_;                      // synchronises itself
+  std::unique_ptr<SqliteAnalyses> analyses_;            // over the two above
 };
 
 template <class T, class Body>

@@ -15,6 +15,7 @@
 #include "engine/analysis/series.hpp"
 #include "engine/base/result.hpp"
 #include "engine/model/event.hpp"
+#include "server/store/analyses.hpp"
 #include "server/store/records.hpp"
 
 namespace colony::server {
@@ -110,6 +111,9 @@ class Store {
   // --- log ---
   virtual Status add_log(std::int64_t job_key, const std::string& level, const std::string& message) = 0;
   virtual Result<std::vector<LogRow>> read_log(std::int64_t job_key, std::int64_t after_index, std::size_t limit) = 0;
+
+  /// Pictures and what was measured on them; lives as long as the store.
+  virtual AnalysisStore& analyses() = 0;
 
   /// ok if a write transaction would succeed now (for readyz): database writable and at least `free_bytes_min` free on the disk.
   virtual Status check_writable(std::uint64_t free_bytes_min) = 0;

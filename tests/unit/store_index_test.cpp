@@ -140,13 +140,13 @@ TEST_F(StoreIndexTest, IsMadeForADatabaseOfTheFirstSchema) {
   {
     Connection old(dir_.path() + "/colony.db", Connection::Access::kWriter);
     old.execute(
-        "DROP TABLE cell_event; ALTER TABLE job DROP COLUMN indexed_seq;"
+        "DROP TABLE analysis; DROP TABLE analysis_image; DROP TABLE cell_event; ALTER TABLE job DROP COLUMN indexed_seq;"
         "CREATE INDEX event_by_cell ON event (job_key, cell_id, seq);"
         "CREATE INDEX placement_by_cell ON placement (job_key, cell_id, seq); PRAGMA user_version = 1");
     old.checkpoint(true);
   }
   open();
-  EXPECT_EQ(number("PRAGMA user_version"), 2);
+  EXPECT_EQ(number("PRAGMA user_version"), 3);
   EXPECT_EQ(number("SELECT indexed_seq FROM job"), 300);
   EXPECT_EQ(number("SELECT count(*) FROM sqlite_schema WHERE name IN ('event_by_cell', 'placement_by_cell')"), 0);
   expect_exact(job_key);

@@ -1,0 +1,258 @@
+// lineage, mesh, measure, analyze, compare: what was measured on a colony or on a picture, and files that other programs read.
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <memory>
+#include <optional>
+
+#include <CLI/CLI.hpp>
+
+#include "client/cli/commands.hpp"
+#include "client/cli/output.hpp"
+#include "client/cli/problem.hpp"
+
+namespace colony::client {
+namespace {
+
+constexpr std::size_t kImageBytesMax = 1u << 30;  // the server's own limit is lower, and told by it
+constexpr std::chrono::milliseconds kPollInterval{500};
+
+struct FileOptions {
+  std::string id, output;
+  std::optional<std::string> at_h, triangles_max;
+  bool no_nuclei = false;
+};
+
+/// Copies an answer of any type to the output.
+ExitCode fetch_file(Session& session, const Target& target, const std::string& accept, const std::string& path) {
+  HttpRequest request;
+  request.target = target.text();
+  request.accept = accept;
+  Output output(session.env, path);
+  require_ok(session.client().receive(request, [&](std::string_view bytes) { output.write(bytes); }));
+  output.finish();
+  if (!path.empty() && path != "-") {
+    session.env.err << "wrote " << printable(path) << " (" << output.written_bytes() << " bytes)\n";
+  }
+  return ExitCode::kDone;
+}
+
+ExitCode fetch_lineage(Session& session, const FileOptions& options) {
+  Target target = job_target(resolve_job_id(session, options.id), "/lineage");
+  target.add_if("at_h", options.at_h);
+  return fetch_file(session, target, session.json ? "application/json" : "text/x-newick", options.output);
+}
+
+ExitCode fetch_mesh(Session& session, const FileOptions& options) {
+  if (session.json) throw Failure(ExitCode::kUsage, "--json: a mesh has no JSON form");
+  if (options.output.empty() && session.env.out_is_terminal) {
+    throw Failure(ExitCode::kUsage, "a mesh is not for a terminal: give -o FILE");
+  }
+  Target target = job_target(resolve_job_id(session, options.id), "/mesh");
+  target.add_if("at_h", options.at_h).add_if("triangles_max", options.triangles_max);
+  if (options.no_nuclei) target.add("nuclei", "false");
+  return fetch_file(session, target, "model/gltf-binary", options.output);
+}
+
+/// A dimension as "1.62 (se 0.01, 3..120 px)", or why there is none.
+std::string line_text(const Json& line) {
+  const Json& d0 = line.at("d0");
+  if (d0.is_null()) return "none: " + printable(line.at("reason").get<std::string>());
+  const Json& crossover = line.at("crossover").at("found");
+  return member_text(d0, "value") + " (se " + member_text(d0, "se", 3) + ", boxes of " + d0.at("range_px")[0].dump() + " to " +
+         d0.at("range_px")[1].dump() + " px" + (crossover.get<bool>() ? ", a crossover)" : ")");
+}
+
+void print_lines(std::ostream& out, const Json& measured) {
+  out << "walls D0    " << line_text(measured.at("fractal").at("walls")) << '\n';
+  out << "outline D0  " << line_text(measured.at("fractal").at("outline")) << '\n';
+  for (const Json& control : measured.at("controls")) {
+    out << "  control " << printable(control.at("name").get<std::string>()) << ": walls " << line_text(control.at("walls")) << '\n';
+  }
+}
+
+void print_verdict(std::ostream& out, const Json& measured) {
+  for (const Json& sentence : measured.at("verdict")) out << "- " << printable(sentence.get<std::string>()) << '\n';
+}
+
+ExitCode measure(Session& session, const FileOptions& options) {
+  Target target = job_target(resolve_job_id(session, options.id), "/analysis");
+  target.add_if("at_h", options.at_h);
+  const HttpResponse response = session.client().send({.target = target.text()});
+  require_ok(response);
+  if (session.json) {
+    session.env.out << response.body << '\n';
+    return ExitCode::kDone;
+  }
+  const Json measured = body_json(response);
+  session.env.out << member_text(measured, "cell_count") << " cells at " << member_text(measured, "time_h") << " h\n";
+  print_lines(session.env.out, measured);
+  print_verdict(session.env.out, measured);
+  return ExitCode::kDone;
+}
+
+struct AnalyzeOptions {
+  std::string file, steps;
+  std::optional<std::string> name, um_per_px, foreground, channel, threshold, pipeline;
+  bool clahe = false;
+};
+
+/// By the first bytes, as the server does; Failure kUsage for anything else.
+std::string image_type(const std::string& bytes, const std::string& path) {
+  const auto begins = [&](std::string_view magic) { return bytes.compare(0, magic.size(), magic) == 0; };
+  if (begins("\x89PNG")) return "image/png";
+  if (begins("\xff\xd8\xff")) return "image/jpeg";
+  if (begins(std::string_view("II*\0", 4)) || begins(std::string_view("MM\0*", 4)) || begins(std::string_view("II+\0", 4)) ||
+      begins(std::string_view("MM\0+", 4))) {
+    return "image/tiff";
+  }
+  throw Failure(ExitCode::kUsage, printable(path) + ": is no PNG, TIFF or JPEG");
+}
+
+/// Asks until the server has done it. Failure kJobFailed if it could not.
+Json when_done(Session& session, HttpResponse response) {
+  require_ok(response);
+  for (;;) {
+    Json row = body_json(response);
+    const std::string state = row.at("state").get<std::string>();
+    if (state == "succeeded") return row;
+    if (state == "failed") throw Failure(ExitCode::kJobFailed, printable(row.at("detail").get<std::string>()));
+    session.env.interrupt.wait(kPollInterval);
+    if (session.env.interrupt.raised()) {
+      throw Failure(ExitCode::kInterrupted, "interrupted; it goes on at the server as " + row.at("id").get<std::string>());
+    }
+    response = session.client().send({.target = row.at("links").at("self").get<std::string>()});
+    require_ok(response);
+  }
+}
+
+void save_steps(Session& session, const Json& row, const std::string& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) throw Failure(ExitCode::kUsage, printable(folder) + ": " + error.message());
+  int index = 0;
+  for (const Json& step : row.at("result").at("steps")) {
+    const std::string name = step.at("name").get<std::string>();
+    const bool is_plain = !name.empty() && std::all_of(name.begin(), name.end(), [](char c) {
+      return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
+    });
+    if (!is_plain) throw Failure(ExitCode::kRefused, "the server names a step that cannot be a file's name");
+    const std::string number = std::to_string(++index);
+    fetch_file(session, Target(row.at("links").at("steps").get<std::string>() + "/" + name), "image/png",
+               folder + "/" + (number.size() < 2 ? "0" : "") + number + "-" + name + ".png");
+  }
+}
+
+ExitCode analyze(Session& session, const AnalyzeOptions& options) {
+  HttpRequest request;
+  request.method = "POST";
+  request.body = read_input(session.env, options.file, kImageBytesMax);
+  request.body_type = image_type(*request.body, options.file);
+  Target target("/v1/analyses");
+  target.add_if("name", options.name)
+      .add_if("um_per_px", options.um_per_px)
+      .add_if("foreground", options.foreground)
+      .add_if("channel", options.channel)
+      .add_if("threshold", options.threshold)
+      .add_if("pipeline", options.pipeline);
+  if (options.clahe) target.add("clahe", "true");
+  request.target = target.text();
+  const Json row = when_done(session, session.client().send(request));
+  if (!options.steps.empty()) save_steps(session, row, options.steps);
+  std::ostream& out = session.env.out;
+  if (session.json) {
+    out << row.dump() << '\n';
+    return ExitCode::kDone;
+  }
+  const Json& result = row.at("result");
+  const Json& segmentation = result.at("segmentation");
+  out << "analysis " << row.at("id").get<std::string>() << '\n'
+      << member_text(segmentation, "object_count") << " objects (" << printable(member_text(segmentation, "pipeline")) << ", threshold "
+      << member_text(segmentation, "threshold") << "), mean area " << member_text(segmentation, "area_mean_px", 1) << " px, "
+      << member_text(segmentation, "foreground_share", 3) << " of the field covered\n";
+  print_lines(out, result);
+  print_verdict(out, result);
+  return ExitCode::kDone;
+}
+
+struct CompareOptions {
+  std::string id, analysis_id, figure;
+  std::optional<std::string> at_h, name;
+};
+
+ExitCode compare(Session& session, const CompareOptions& options) {
+  Json body = {{"job_id", resolve_job_id(session, options.id)}, {"analysis_id", options.analysis_id}};
+  if (options.at_h) body["at_h"] = number_option("--at-h", *options.at_h);
+  if (options.name) body["name"] = *options.name;
+  HttpRequest request;
+  request.method = "POST";
+  request.target = "/v1/comparisons";
+  request.body = body.dump();
+  const Json row = when_done(session, session.client().send(request));
+  if (!options.figure.empty()) {
+    fetch_file(session, Target(row.at("links").at("figure").get<std::string>()), "image/png", options.figure);
+  }
+  if (session.json) {
+    session.env.out << row.dump() << '\n';
+    return ExitCode::kDone;
+  }
+  const Json& result = row.at("result");
+  session.env.out << "comparison " << row.at("id").get<std::string>() << '\n';
+  for (const char* side : {"simulated", "real"}) {
+    session.env.out << side << ", " << member_text(result.at(side), "cell_count") << " cells of "
+                    << member_text(result.at(side), "cell_area_mean_px", 0) << " px\n";
+    print_lines(session.env.out, result.at(side));
+  }
+  print_verdict(session.env.out, result);
+  return ExitCode::kDone;
+}
+
+CLI::App* add_file_command(CLI::App& app, const char* name, const char* text, FileOptions& options, bool has_output) {
+  CLI::App* command = app.add_subcommand(name, text);
+  command->add_option("ID", options.id, "Job id, or its unique end")->required();
+  command->add_option("--at-h", options.at_h, "Model time, h (default: now, or the end)");
+  if (has_output) command->add_option("-o,--output", options.output, "File; it appears whole or not at all");
+  return command;
+}
+
+}  // namespace
+
+void add_measure_commands(CLI::App& app, Session& session, Action& action) {
+  auto lineage = std::make_shared<FileOptions>();
+  CLI::App* command = add_file_command(app, "lineage", "Who came from whom, as Newick trees (--json: a table)", *lineage, true);
+  command->callback([&session, &action, lineage] { action = [&session, lineage] { return fetch_lineage(session, *lineage); }; });
+
+  auto mesh = std::make_shared<FileOptions>();
+  command = add_file_command(app, "mesh", "The surfaces of cells and nuclei, as binary glTF (GLB)", *mesh, true);
+  command->add_option("--triangles-max", mesh->triangles_max, "Most triangles");
+  command->add_flag("--no-nuclei", mesh->no_nuclei, "Without nuclei");
+  command->callback([&session, &action, mesh] { action = [&session, mesh] { return fetch_mesh(session, *mesh); }; });
+
+  auto measured = std::make_shared<FileOptions>();
+  command = add_file_command(app, "measure", "Measurements of a colony, with controls, and what follows from them", *measured, false);
+  command->callback([&session, &action, measured] { action = [&session, measured] { return measure(session, *measured); }; });
+
+  auto picture = std::make_shared<AnalyzeOptions>();
+  command = app.add_subcommand("analyze", "Count and measure what a picture shows");
+  command->add_option("FILE", picture->file, "PNG, TIFF or JPEG")->required();
+  command->add_option("--name", picture->name, "A name for people");
+  command->add_option("--um-per-px", picture->um_per_px, "Size of a pixel (else lengths are in pixels)");
+  command->add_option("--foreground", picture->foreground, "auto, light or dark");
+  command->add_option("--channel", picture->channel, "Which channel, from 0");
+  command->add_option("--threshold", picture->threshold, "0 to 254 (default: by Otsu)");
+  command->add_option("--pipeline", picture->pipeline, "auto, nuclei, phase or contours");
+  command->add_flag("--clahe", picture->clahe, "Even the local contrast first");
+  command->add_option("--steps", picture->steps, "Folder for a picture of every step");
+  command->callback([&session, &action, picture] { action = [&session, picture] { return analyze(session, *picture); }; });
+
+  auto both = std::make_shared<CompareOptions>();
+  command = app.add_subcommand("compare", "A colony against an analysed picture");
+  command->add_option("ID", both->id, "Job id, or its unique end")->required();
+  command->add_option("ANALYSIS", both->analysis_id, "Id of the analysis, as `analyze` prints it")->required();
+  command->add_option("--at-h", both->at_h, "Model time, h (default: now, or the end)");
+  command->add_option("--name", both->name, "A name for people");
+  command->add_option("--figure", both->figure, "File for the figure (PNG)");
+  command->callback([&session, &action, both] { action = [&session, both] { return compare(session, *both); }; });
+}
+
+}  // namespace colony::client

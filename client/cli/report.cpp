@@ -1,0 +1,237 @@
+#include "client/cli/report.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace colony::client {
+namespace {
+
+constexpr double kWidth = 640, kHeight = 400, kLeft = 70, kBottom = 50, kTop = 15, kRight = 15;
+
+constexpr std::string_view kStyle =
+    "body{font:15px/1.5 sans-serif;max-width:60em;margin:2em auto;padding:0 1em;color:#222}"
+    "table{border-collapse:collapse;margin:1em 0}td,th{border:1px solid #ccc;padding:.2em .6em;text-align:left}"
+    "td.n{text-align:right}figure{display:inline-block;margin:.5em 1em .5em 0}img{max-width:26em;border:1px solid #ccc}"
+    "svg{border:1px solid #ccc;max-width:100%}code{word-break:break-all}";
+
+std::string number(double value, int decimals = 2) { return fixed(value, decimals); }
+
+/// 1, 2 or 5 times a power of ten, so that at most about six fit below `high`.
+double tick_step(double high) {
+  const double rough = std::max(high, 1e-300) / 6.0;
+  const double decade = std::pow(10.0, std::floor(std::log10(rough)));
+  for (const double factor : {1.0, 2.0, 5.0}) {
+    if (factor * decade >= rough) return factor * decade;
+  }
+  return 10.0 * decade;
+}
+
+struct Axis {
+  double low = 0, high = 1;
+  bool is_logarithmic = false;
+  double share(double value) const {
+    return is_logarithmic ? std::log(value / low) / std::log(high / low) : (value - low) / (high - low);
+  }
+  std::vector<double> ticks() const {
+    std::vector<double> out;
+    if (is_logarithmic) {
+      for (double at = low; at <= high * 1.0001; at *= 10.0) out.push_back(at);
+    } else {
+      const double step = tick_step(high);
+      for (int i = 0; i * step <= high * 1.0001; ++i) out.push_back(i * step);
+    }
+    return out;
+  }
+};
+
+Axis axis_of(const std::vector<Curve>& curves, bool is_x, bool is_logarithmic) {
+  double least = 1e300, most = 0;
+  for (const Curve& curve : curves) {
+    for (const auto& [x, y] : curve.points) {
+      least = std::min(least, is_x ? x : y);
+      most = std::max(most, is_x ? x : y);
+    }
+  }
+  if (!is_logarithmic) return {0, most > 0 ? most * 1.02 : 1, false};
+  if (!(least > 0 && least < 1e300)) return {1, 10, true};
+  const double low = std::pow(10.0, std::floor(std::log10(least)));
+  return {low, std::max(most * 1.1, low * 10), true};
+}
+
+std::string table_row(const std::string& name, const std::string& value) {
+  return "<tr><th>" + html_text(name) + "</th><td>" + html_text(value) + "</td></tr>";
+}
+
+/// Every leaf of an object as a row "a.b.c | value".
+void add_leaves(const Json& value, const std::string& path, std::string& out) {
+  if (value.is_object() && !value.empty()) {
+    for (const auto& [name, member] : value.items()) add_leaves(member, path.empty() ? name : path + "." + name, out);
+    return;
+  }
+  out += table_row(path, value.is_string() ? value.get<std::string>() : value.dump());
+}
+
+Curve curve_of(const Json& line, const char* name, const char* colour) {
+  Curve curve{name, colour, {}};
+  for (const Json& point : line.at("curve")) {
+    curve.points.emplace_back(point.at("side_px").get<double>(), point.at("count_mean").get<double>());
+  }
+  return curve;
+}
+
+std::string dimension_row(const std::string& name, const Json& line) {
+  const Json& d0 = line.at("d0");
+  if (d0.is_null()) return table_row(name, line.at("reason").is_string() ? line.at("reason").get<std::string>() : "-");
+  const bool is_crossover = line.at("crossover").at("found").get<bool>();
+  return "<tr><th>" + html_text(name) + "</th><td class=n>" + number(d0.at("value").get<double>(), 3) + "</td><td class=n>" +
+         number(d0.at("se").get<double>(), 3) + "</td><td class=n>" + number(d0.at("r2").get<double>(), 4) + "</td><td>" +
+         d0.at("range_px")[0].dump() + " to " + d0.at("range_px")[1].dump() + " px</td><td>" +
+         (is_crossover ? "crossover, not scaling" : "no drift found") + "</td></tr>";
+}
+
+std::string fractal_section(const Json& analysis) {
+  const Json& fractal = analysis.at("fractal");
+  std::vector<Curve> curves = {curve_of(fractal.at("walls"), "cell walls", "#000"),
+                               curve_of(fractal.at("outline"), "colony outline", "#1f77b4")};
+  std::string rows = dimension_row("cell walls", fractal.at("walls")) + dimension_row("colony outline", fractal.at("outline"));
+  const char* const colours[] = {"#2ca02c", "#d62728", "#ff7f0e", "#9467bd"};
+  std::size_t index = 0;
+  for (const Json& control : analysis.at("controls")) {
+    const std::string name = control.at("name").get<std::string>();
+    curves.push_back(curve_of(control.at("walls"), "", colours[index++ % 4]));
+    curves.back().name = "control " + name;
+    rows += dimension_row("control " + name + ", walls", control.at("walls"));
+    rows += dimension_row("control " + name + ", outline", control.at("outline"));
+  }
+  std::string out = "<h2>Box counting</h2><ul>";
+  for (const Json& sentence : analysis.at("verdict")) out += "<li>" + html_text(sentence.get<std::string>()) + "</li>";
+  out += "</ul>" + curves_svg(curves, "side of a box, px", "boxes met", true);
+  return out + "<table><tr><th>line</th><th>D0</th><th>se of the line</th><th>r2</th><th>boxes</th><th>local slopes</th></tr>" + rows +
+         "</table>";
+}
+
+std::string shape_section(const Json& analysis) {
+  std::string rows;
+  for (const char* name : {"colony", "cells", "apart", "packing", "growth"}) add_leaves(analysis.at(name), name, rows);
+  std::string out = "<h2>Shapes, packing, growth</h2><table>" + rows + "</table><h2>Neighbours of interior cells</h2><table>";
+  out += "<tr><th>sides</th><th>cells</th><th>share</th><th>Gibson 2006</th></tr>";
+  for (const Json& row : analysis.at("neighbours").at("classes")) {
+    out += "<tr><td class=n>" + row.at("sides").dump() + "</td><td class=n>" + row.at("count").dump() + "</td><td class=n>" +
+           number(row.at("share").get<double>(), 3) + "</td><td class=n>" + number(row.at("gibson_share").get<double>(), 3) + "</td></tr>";
+  }
+  return out + "</table>";
+}
+
+std::string growth_section(const Json& series) {
+  Curve cells{"cells", "#000", {}}, active{"active", "#2ca02c", {}}, radius{"radius, um", "#1f77b4", {}};
+  for (const Json& row : series) {
+    const double time_h = row.at("time_h").get<double>();
+    cells.points.emplace_back(time_h, row.at("cell_count").get<double>());
+    active.points.emplace_back(time_h, row.at("active_count").get<double>());
+    radius.points.emplace_back(time_h, row.at("radius_um").get<double>());
+  }
+  return "<h2>Growth</h2>" + curves_svg({cells, active}, "time, h", "cells", false) +
+         curves_svg({radius}, "time, h", "radius of the colony, um", false);
+}
+
+}  // namespace
+
+std::string html_text(std::string_view text) {
+  std::string out;
+  for (const char c : printable(text)) {
+    if (c == '&') {
+      out += "&amp;";
+    } else if (c == '<') {
+      out += "&lt;";
+    } else if (c == '>') {
+      out += "&gt;";
+    } else if (c == '"') {
+      out += "&quot;";
+    } else {
+      out += c;
+    }
+  }
+  return out;
+}
+
+std::string base64(std::string_view bytes) {
+  constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string out;
+  out.reserve((bytes.size() + 2) / 3 * 4);
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    const auto byte = [&](std::size_t at) { return at < bytes.size() ? static_cast<unsigned char>(bytes[at]) : 0U; };
+    const unsigned group = byte(i) << 16 | byte(i + 1) << 8 | byte(i + 2);
+    for (int digit = 0; digit < 4; ++digit) {
+      const bool is_there = i + static_cast<std::size_t>(digit) <= bytes.size();
+      out += is_there ? kDigits[group >> (18 - 6 * digit) & 63] : '=';
+    }
+  }
+  return out;
+}
+
+std::string curves_svg(const std::vector<Curve>& curves, const std::string& x_title, const std::string& y_title,
+                       bool is_logarithmic) {
+  const Axis x = axis_of(curves, true, is_logarithmic), y = axis_of(curves, false, is_logarithmic);
+  const auto place_x = [&](double value) { return kLeft + x.share(value) * (kWidth - kLeft - kRight); };
+  const auto place_y = [&](double value) { return kHeight - kBottom - y.share(value) * (kHeight - kBottom - kTop); };
+  std::string out = "<svg viewBox=\"0 0 " + number(kWidth, 0) + " " + number(kHeight, 0) + "\" width=\"" + number(kWidth, 0) +
+                    "\" role=\"img\" font-family=\"sans-serif\" font-size=\"12\">";
+  const auto text = [&](double at_x, double at_y, const char* anchor, const std::string& what, const std::string& colour) {
+    out += "<text x=\"" + number(at_x, 1) + "\" y=\"" + number(at_y, 1) + "\" text-anchor=\"" + anchor + "\" fill=\"" + colour + "\">" +
+           html_text(what) + "</text>";
+  };
+  const auto line = [&](double x1, double y1, double x2, double y2) {
+    out += "<path d=\"M" + number(x1, 1) + " " + number(y1, 1) + "L" + number(x2, 1) + " " + number(y2, 1) + "\" stroke=\"#ddd\"/>";
+  };
+  for (const double tick : x.ticks()) {
+    line(place_x(tick), kTop, place_x(tick), kHeight - kBottom);
+    text(place_x(tick), kHeight - kBottom + 16, "middle", number(tick, tick < 1 && tick > 0 ? 2 : 0), "#444");
+  }
+  for (const double tick : y.ticks()) {
+    line(kLeft, place_y(tick), kWidth - kRight, place_y(tick));
+    text(kLeft - 6, place_y(tick) + 4, "end", number(tick, tick < 1 && tick > 0 ? 2 : 0), "#444");
+  }
+  text((kLeft + kWidth) / 2, kHeight - 10, "middle", x_title, "#000");
+  text(kLeft, kTop - 3, "start", y_title, "#000");
+  double legend = kTop + 16;
+  for (const Curve& curve : curves) {
+    if (curve.points.empty()) continue;
+    std::string path;
+    for (const auto& [at_x, at_y] : curve.points) {
+      if (is_logarithmic && !(at_x > 0 && at_y > 0)) continue;
+      path += (path.empty() ? "M" : "L") + number(place_x(at_x), 1) + " " + number(place_y(at_y), 1);
+    }
+    out += "<path d=\"" + path + "\" fill=\"none\" stroke=\"" + curve.colour + "\" stroke-width=\"1.5\"/>";
+    text(kWidth - kRight - 6, legend, "end", curve.name, curve.colour);
+    legend += 15;
+  }
+  return out + "</svg>";
+}
+
+std::string report_html(const ReportInput& input) {
+  const Json& job = input.job;
+  const std::string name = job.at("name").get<std::string>();
+  const std::string title = name.empty() ? "Colony " + job.at("id").get<std::string>() : name;
+  std::string out = "<!doctype html><html lang=en><head><meta charset=utf-8><title>" + html_text(title) + "</title><style>" +
+                    std::string(kStyle) + "</style></head><body><h1>" + html_text(title) + "</h1><table>";
+  for (const char* member : {"id", "state", "reason", "created_at", "finished_at", "engine_version"}) {
+    out += table_row(member, cell_text(job.at(member)));
+  }
+  for (const char* member : {"time_h", "cells", "active", "passive", "senescent"}) {
+    out += table_row(member, member_text(job.at("progress"), member));
+  }
+  out += table_row("events", member_text(job, "last_seq"));
+  out += "<tr><th>digest</th><td><code>" + html_text(job.at("digest").get<std::string>()) + "</code></td></tr></table>";
+  out += "<h2>Pictures</h2>";
+  for (const auto& [caption, png] : input.pictures) {
+    out += "<figure><img alt=\"" + html_text(caption) + "\" src=\"data:image/png;base64," + base64(png) + "\"><figcaption>" +
+           html_text(caption) + "</figcaption></figure>";
+  }
+  out += growth_section(input.series);
+  if (!input.analysis.is_null()) out += fractal_section(input.analysis) + shape_section(input.analysis);
+  std::string rows;
+  add_leaves(job.at("spec"), "", rows);
+  return out + "<h2>Parameters</h2><table>" + rows + "</table></body></html>\n";
+}
+
+}  // namespace colony::client

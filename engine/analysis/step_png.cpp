@@ -1,0 +1,44 @@
+#include <cstdlib>
+#include <memory>
+
+#include <spng.h>
+
+#include "engine/analysis/image_analysis.hpp"
+#include "engine/base/check.hpp"
+
+namespace colony {
+namespace {
+
+struct FreeContext {
+  void operator()(spng_ctx* context) const { spng_ctx_free(context); }
+};
+struct FreeBuffer {
+  void operator()(void* buffer) const { std::free(buffer); }  // libspng's buffers come from malloc
+};
+
+}  // namespace
+
+std::string encode_step_png(const StepImage& step) {
+  CHECK(step.channel_count == 1 || step.channel_count == 3);
+  CHECK(step.width_px >= 1 && step.height_px >= 1 && step.width_px <= kImageSideMax_px &&
+        step.height_px <= kImageSideMax_px);
+  CHECK(step.values.size() == static_cast<std::size_t>(step.width_px * step.height_px * step.channel_count));
+  const std::unique_ptr<spng_ctx, FreeContext> context(spng_ctx_new(SPNG_CTX_ENCODER));
+  CHECK(context != nullptr);
+  CHECK(spng_set_option(context.get(), SPNG_ENCODE_TO_BUFFER, 1) == 0);
+  spng_ihdr header{};
+  header.width = static_cast<std::uint32_t>(step.width_px);
+  header.height = static_cast<std::uint32_t>(step.height_px);
+  header.bit_depth = 8;
+  header.color_type = step.channel_count == 1 ? SPNG_COLOR_TYPE_GRAYSCALE : SPNG_COLOR_TYPE_TRUECOLOR;
+  CHECK(spng_set_ihdr(context.get(), &header) == 0);
+  CHECK(spng_encode_image(context.get(), step.values.data(), step.values.size(), SPNG_FMT_PNG, SPNG_ENCODE_FINALIZE) ==
+        0);
+  std::size_t size = 0;
+  int status = 0;
+  const std::unique_ptr<void, FreeBuffer> bytes(spng_get_png_buffer(context.get(), &size, &status));
+  CHECK(bytes != nullptr && status == 0);
+  return std::string(static_cast<const char*>(bytes.get()), size);
+}
+
+}  // namespace colony

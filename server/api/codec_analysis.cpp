@@ -1,0 +1,187 @@
+#include "server/api/codec_analysis.hpp"
+
+#include "server/api/codec_spec.hpp"
+#include "server/api/schema.hpp"
+
+namespace colony::server::api {
+namespace {
+
+constexpr double kAtMax_h = 1e9;
+
+Json text_or_null(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
+
+Json typed(const char* type) { return {{"type", type}}; }
+Json nullable(const char* type) { return {{"type", Json::array({type, "null"})}}; }
+Json one_of(std::initializer_list<const char*> names) {
+  Json list = Json::array();
+  for (const char* name : names) list.push_back(name);
+  return {{"enum", std::move(list)}};
+}
+Json or_null(Json schema) { return {{"anyOf", Json::array({std::move(schema), {{"type", "null"}}})}}; }
+Json list(Json item) { return {{"type", "array"}, {"items", std::move(item)}}; }
+
+Json common_properties(const char* kind) {
+  Json properties = {{"id", typed("string")},
+                     {"kind", {{"const", kind}}},
+                     {"name", typed("string")},
+                     {"state", one_of({"queued", "running", "succeeded", "failed"})},
+                     {"failure_code", nullable("string")},
+                     {"detail", nullable("string")}};
+  properties["created_at"] = {{"type", "string"}, {"format", "date-time"}};
+  properties["finished_at"] = {{"type", Json::array({"string", "null"})}, {"format", "date-time"}};
+  return properties;
+}
+
+Json links(std::initializer_list<const char*> names) {
+  Json properties = Json::object();
+  for (const char* name : names) properties[name] = {{"type", "string"}, {"format", "uri-reference"}};
+  return strict_object(std::move(properties));
+}
+
+Json fractal_properties() {
+  const Json lines = {{"walls", reference("MeasuredLine")}, {"outline", reference("MeasuredLine")}};
+  Json control = {{"name", one_of({"without_noise", "hexagonal", "random_discs"})}};
+  control.update(lines);
+  return {{"fractal", strict_object(lines)}, {"controls", list(strict_object(std::move(control)))}};
+}
+
+Json picture_result() {
+  Json properties = {{"image", reference("ImageMetadata")},
+                     {"segmentation", reference("Segmentation")},
+                     {"steps", list(strict_object({{"name", typed("string")}, {"text", typed("string")}}))},
+                     {"verdict", list(typed("string"))},
+                     {"cell_count", typed("integer")},
+                     {"cell_area_mean_px", typed("number")}};
+  properties.update(fractal_properties());
+  properties["measurements"] = or_null(reference("Shapes"));
+  properties["reason"] = nullable("string");
+  return strict_object(std::move(properties));
+}
+
+Json comparison_result() {
+  Json side = {{"um_per_px", nullable("number")}, {"cell_count", typed("integer")}, {"cell_area_mean_px", typed("number")}};
+  side.update(fractal_properties());
+  const Json difference = or_null(strict_object({{"simulated", typed("number")},
+                                                 {"real", typed("number")},
+                                                 {"difference", typed("number")},
+                                                 {"se", typed("number")},
+                                                 {"differs", typed("boolean")}}));
+  return strict_object({{"time_h", typed("number")},
+                        {"last_seq", typed("integer")},
+                        {"digest", typed("string")},
+                        {"verdict", list(typed("string"))},
+                        {"differences", strict_object({{"walls", difference}, {"outline", difference}})},
+                        {"simulated", strict_object(side)},
+                        {"real", strict_object(side)}});
+}
+
+Json page_of(std::string_view component) {
+  return strict_object({{"items", list(reference(component))}, {"next", nullable("string")}});
+}
+
+}  // namespace
+
+Result<ComparisonSpec> decode_comparison_spec(const Json& body) {
+  if (!body.is_object()) return Error{ErrorCode::kInvalid, "the body is wrong", {{"", "must be an object"}}};
+  ComparisonSpec spec;
+  std::vector<FieldError> errors;
+  const auto read_text = [&](const Json& value, const std::string& pointer, std::string& to) {
+    if (value.is_string()) {
+      to = value.get<std::string>();
+    } else {
+      errors.push_back({pointer, "must be a string"});
+    }
+  };
+  for (const auto& [name, value] : body.items()) {
+    const std::string pointer = child_pointer("", name);
+    if (name == "job_id") {
+      read_text(value, pointer, spec.job_id);
+    } else if (name == "analysis_id") {
+      read_text(value, pointer, spec.analysis_id);
+    } else if (name == "name") {
+      read_text(value, pointer, spec.name);
+      if (const std::string wrong = name_error(spec.name); !wrong.empty()) errors.push_back({pointer, wrong});
+    } else if (name == "at_h") {
+      if (value.is_null()) continue;
+      if (value.is_number() && value.get<double>() >= 0.0 && value.get<double>() <= kAtMax_h) {
+        spec.at_h = value.get<double>();
+      } else {
+        errors.push_back({pointer, "must be a number within 0 to 1000000000, or null for now"});
+      }
+    } else {
+      errors.push_back({pointer, "unknown field; there are job_id, analysis_id, at_h and name"});
+    }
+  }
+  for (const char* name : {"job_id", "analysis_id"}) {
+    if (!body.contains(name)) errors.push_back({child_pointer("", name), "is missing"});
+  }
+  if (!errors.empty()) return Error{ErrorCode::kInvalid, "the comparison is wrong", std::move(errors)};
+  return spec;
+}
+
+Json encode_analysis(const AnalysisRow& row, bool with_result) {
+  const bool is_comparison = row.kind == AnalysisKind::kComparison;
+  const std::string self = (is_comparison ? "/v1/comparisons/" : "/v1/analyses/") + row.id;
+  Json out = {{"id", row.id},
+              {"kind", name_of(row.kind)},
+              {"name", row.name},
+              {"state", name_of(row.state)},
+              {"failure_code", text_or_null(row.failure_code)},
+              {"detail", text_or_null(row.detail)},
+              {"created_at", row.created_at},
+              {"finished_at", text_or_null(row.finished_at)}};
+  if (is_comparison) {
+    out["job_id"] = row.job_id;
+    out["analysis_id"] = row.analysis_id;
+  } else {
+    out["media_type"] = row.media_type;
+    out["image_bytes"] = row.image_bytes;
+  }
+  out["options"] = Json::parse(row.options_json);
+  if (with_result) out["result"] = row.result_json.empty() ? Json(nullptr) : Json::parse(row.result_json);
+  out["links"] = {{"self", self}};
+  if (is_comparison) {
+    out["links"]["figure"] = self + "/figure";
+  } else {
+    out["links"]["steps"] = self + "/steps";
+  }
+  return out;
+}
+
+Json analysis_components() {
+  Json analysis = common_properties("analysis");
+  analysis["media_type"] = one_of({"image/png", "image/tiff", "image/jpeg"});
+  analysis["image_bytes"] = typed("integer");
+  analysis["options"] = strict_object({{"um_per_px", nullable("number")},
+                                       {"channel", nullable("integer")},
+                                       {"pipeline", one_of({"auto", "nuclei", "phase", "contours"})},
+                                       {"foreground", one_of({"auto", "light", "dark"})},
+                                       {"threshold", nullable("integer")},
+                                       {"clahe", typed("boolean")}});
+  analysis["links"] = links({"self", "steps"});
+  Json comparison = common_properties("comparison");
+  comparison["job_id"] = comparison["analysis_id"] = typed("string");
+  comparison["options"] = strict_object({{"at_h", typed("number")}});
+  comparison["links"] = links({"self", "figure"});
+  Json spec = {{"type", "object"},
+               {"properties",
+                {{"job_id", typed("string")},
+                 {"analysis_id", typed("string")},
+                 {"at_h", {{"type", Json::array({"number", "null"})}, {"minimum", 0}, {"maximum", kAtMax_h}}},
+                 {"name", typed("string")}}},
+               {"required", Json::array({"job_id", "analysis_id"})},
+               {"additionalProperties", false}};
+  Json components = {{"AnalysisSummary", strict_object(analysis)}, {"ComparisonSummary", strict_object(comparison)}};
+  analysis["result"] = or_null(reference("PictureResult"));
+  comparison["result"] = or_null(reference("ComparisonResult"));
+  components.update({{"Analysis", strict_object(std::move(analysis))},
+                     {"AnalysisList", page_of("AnalysisSummary")},
+                     {"Comparison", strict_object(std::move(comparison))},
+                     {"ComparisonList", page_of("ComparisonSummary")},
+                     {"ComparisonSpec", std::move(spec)},
+                     {"PictureResult", picture_result()},
+                     {"ComparisonResult", comparison_result()}});
+  return components;
+}
+
+}  // namespace colony::server::api

@@ -1,0 +1,116 @@
+// Handlers of comparisons: a colony at a time against a picture that was sent.
+#include "server/api/analysis_work.hpp"
+#include "server/api/api.hpp"
+#include "server/api/codec_analysis.hpp"
+#include "server/api/compare.hpp"
+
+namespace colony::server::api {
+namespace {
+
+// The analysis as the comparison needs it: its options and its image.
+struct Source {
+  AnalysisRow row;
+  std::string image;
+};
+
+Result<Source> source_of(Context& context, const std::string& id) {
+  AnalysisStore& store = context.jobs.store().analyses();
+  auto row = store.find(AnalysisKind::kAnalysis, id);
+  if (!row) return row.error();
+  auto image = store.image(id);
+  if (!image) return image.error();
+  return Source{std::move(*row), std::move(*image)};
+}
+
+Error gone_with(const char* pointer, Error error) {
+  error.fields = {{pointer, error.message}};
+  if (error.code == ErrorCode::kNotFound) error.code = ErrorCode::kInvalid;  // the resource is there, what it names is not
+  return error;
+}
+
+Result<Comparison> compare_again(Context& context, const AnalysisRow& row, const Effort& effort) {
+  auto found = source_of(context, row.analysis_id);
+  if (!found) return found.error();
+  auto at = context.jobs.colony_at(row.job_id, Json::parse(row.options_json)["at_h"].get<double>());
+  if (!at) return at.error();
+  return compare(std::move(*at), found->image, decode_image_options(found->row.options_json), effort);
+}
+
+}  // namespace
+
+AnalysisWorker::Outcome work_on(Context& context, const AnalysisRow& row, StopFlag stop) {
+  const Effort effort{context.config.jobs.threads_per_job, stop};
+  const auto failed = [](const Error& error) {
+    return AnalysisWorker::Outcome{{}, std::string(problem_row(problem_kind_of(error.code)).code), error.message};
+  };
+  if (row.kind == AnalysisKind::kComparison) {
+    const auto comparison = compare_again(context, row, effort);
+    if (!comparison) return failed(comparison.error());
+    return {to_text(encode_comparison(*comparison)), {}, {}};
+  }
+  const auto image = context.jobs.store().analyses().image(row.id);
+  if (!image) return failed(image.error());
+  const auto measured = measure_picture(*image, decode_image_options(row.options_json), effort);
+  if (!measured) return failed(measured.error());
+  return {to_text(encode_picture_result(*measured)), {}, {}};
+}
+
+Effort effort_of(const Context& context) { return {context.config.jobs.threads_per_job, &context.draining}; }
+
+http::Response post_comparison(Context& context, const Call& call) {
+  const auto body = parse_json(call.request.body);
+  if (!body) return failure(body.error(), call);
+  const auto spec = decode_comparison_spec(*body);
+  if (!spec) return failure(spec.error(), call);
+  const auto source = source_of(context, spec->analysis_id);
+  if (!source) return failure(gone_with("/analysis_id", source.error()), call);
+  if (source->row.state != AnalysisState::kSucceeded) {
+    return failure({ErrorCode::kInvalid,
+                    "the analysis has no result",
+                    {{"/analysis_id", "the analysis is " + std::string(name_of(source->row.state))}}},
+                   call);
+  }
+  auto at = context.jobs.colony_at(spec->job_id, spec->at_h);
+  if (!at) return failure(gone_with(spec->at_h && at.error().code != ErrorCode::kNotFound ? "/at_h" : "/job_id", at.error()), call);
+  NewAnalysis comparison;
+  comparison.kind = AnalysisKind::kComparison;
+  comparison.name = spec->name;
+  comparison.job_id = spec->job_id;
+  comparison.analysis_id = spec->analysis_id;
+  // Of a job that goes on: the moment as it is now, so that the figure is of the same colony later.
+  comparison.options_json = to_text({{"at_h", at->time_h}});
+  const Json stored = Json::parse(source->row.result_json);
+  const Json& image = stored["image"];
+  const std::int64_t pixels = image["width_px"].get<std::int64_t>() * image["height_px"].get<std::int64_t>();
+  if (pixels <= kAnalysedAtOncePixelsMax) {
+    const auto made = compare(std::move(*at), source->image, decode_image_options(source->row.options_json),
+                              effort_of(context));
+    if (!made) return failure(made.error(), call);
+    comparison.result_json = to_text(encode_comparison(*made));
+  }
+  return created(context, call, comparison);
+}
+
+http::Response get_comparisons(Context& context, const Call& call) {
+  return listed(context, call, AnalysisKind::kComparison);
+}
+http::Response get_comparison(Context& context, const Call& call) {
+  const auto row = context.jobs.store().analyses().find(AnalysisKind::kComparison, call.id());
+  return row ? json_response(200, encode_analysis(*row, true)) : failure(row.error(), call);
+}
+http::Response delete_comparison(Context& context, const Call& call) {
+  return removed(context, call, AnalysisKind::kComparison);
+}
+
+http::Response get_comparison_figure(Context& context, const Call& call) {
+  const auto row = context.jobs.store().analyses().find(AnalysisKind::kComparison, call.id());
+  if (!row) return failure(row.error(), call);
+  const auto comparison = compare_again(context, *row, effort_of(context));
+  if (!comparison) return failure(comparison.error(), call);
+  http::Response response;
+  response.headers.set("Content-Type", call.media);
+  response.body = comparison_figure(*comparison);
+  return response;
+}
+
+}  // namespace colony::server::api

@@ -1,0 +1,42 @@
+#include "server/api/measure.hpp"
+
+#include <utility>
+
+#include "engine/analysis/controls.hpp"
+#include "engine/analysis/packing.hpp"
+#include "engine/picture/top_view.hpp"
+
+namespace colony::server::api {
+
+Result<LabelledColony> label_colony(const Colony& colony, const PictureSpec& spec, const Effort& effort) {
+  const Result<Frame> frame = frame_of(colony, spec);
+  if (!frame) return frame.error();
+  TopView view = top_view(colony, *frame, {0, frame->height_px}, effort);
+  LabelledColony out;
+  out.labels.width_px = frame->width_px;
+  out.labels.height_px = frame->height_px;
+  out.labels.um_per_px = frame->um_per_px;
+  out.labels.values = std::move(view.owner);
+  out.left_um = frame->left_um;
+  out.top_um = frame->top_um;
+  view = {};  // its heights are not needed beside the control
+  Result<LabelImage> smooth = noise_free_control(colony, frame->width_px, frame->height_px, frame->um_per_px,
+                                                 frame->left_um, frame->top_um);
+  if (!smooth) return smooth.error();
+  out.without_noise = std::move(*smooth);
+  throw_if_stopped(effort.stop);
+  return out;
+}
+
+Result<LabelReport> measure_colony(const ColonyAt& at, const LabelledColony& image, const Effort& effort) {
+  LabelInput input;
+  input.labels = &image.labels;
+  input.without_noise = &image.without_noise;
+  input.siblings = sibling_pairs(*at.colony);
+  input.active = active_labels(*at.colony);
+  input.control_seed = at.spec->seed;
+  input.boxes.threads = effort.threads;
+  return analyse_labels(input, effort.stop);
+}
+
+}  // namespace colony::server::api
