@@ -9,7 +9,7 @@
 namespace colony {
 
 inline constexpr std::string_view kEngineVersion = "0.1.0";
-inline constexpr int kResultsVersion = 1;
+inline constexpr int kResultsVersion = 2;
 
 /// As stored with every job: "0.1.0/1", program version / results version.
 inline std::string engine_version_text() { return std::string(kEngineVersion) + "/" + std::to_string(kResultsVersion); }

@@ -54,7 +54,7 @@ Chromosome random_chromosome(int gene_count, int bits, Stream& stream) {
   return chromosome;
 }
 
-BitFlips::BitFlips(int length, double rate) : length_(length) {
+BitFlips::BitFlips(int length, double rate) : length_(length), never_(rate == 0.0) {
   CHECK(length >= 1 && rate >= 0.0 && rate <= 1.0);
   double survival = 1.0;
   for (int k = 0; k < length; ++k) {

@@ -65,6 +65,7 @@ class BitFlips {
   /// Calls flip(bit) for each flipped bit, ascending.
   template <class Flip>
   void draw(Stream& stream, const Flip& flip) const {
+    if (never_) return;
     for (int bit = gap(stream); bit < length_; bit += 1 + gap(stream)) flip(bit);
   }
 
@@ -72,6 +73,7 @@ class BitFlips {
   int gap(Stream& stream) const;
 
   int length_ = 0;
+  bool never_ = true;
   std::vector<std::uint32_t> survival_;   // [k]: 2^32 P(gap > k), rounded down; falling; then a 0
   std::array<std::uint32_t, 256> guide_{};  // by the highest byte of a draw: a k from which to go on
 };

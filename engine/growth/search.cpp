@@ -2,208 +2,17 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <tuple>
 #include <utility>
 
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
-
 #include "engine/base/check.hpp"
+#include "engine/growth/scorer.hpp"
 #include "engine/space/overlap.hpp"
 
 namespace colony {
 namespace {
 
 constexpr std::uint32_t kCorrectorLane = 1000;  // past the last generation of a predictor
-constexpr double kDropDeviations = 1.5;         // see race_to()
-
-std::array<std::uint32_t, 3> seeds_for(const SearchTask& task, Purpose purpose, std::uint32_t lane) {
-  Stream stream(task.seed, task.cell_id, task.ordinal, purpose, lane);
-  return {stream.next_u32(), stream.next_u32(), stream.next_u32()};
-}
-
 constexpr double kGiveUpMarginLast = 0.02;
-constexpr std::size_t kPointsWorthThreads = 65'536;   // of a generation: 100 us
-
-double share_left(std::uint32_t hits, std::uint32_t shared) {
-  return shared >= hits ? 0.0 : static_cast<double>(hits - shared) / static_cast<double>(hits);
-}
-
-/// Scores candidate pairs of one search.
-class Scorer {
- public:
-  Scorer(const Colony& colony, const Params& params, const SearchTask& task, Workspace& workspace)
-      : colony_(colony), params_(params), task_(task), ws_(workspace) {
-    const double reach = search_reach_um(params);
-    const Vec3& c = task.frame.pivot_um;
-    // Everything a candidate can touch: all z, because bodies stand on the dish or little above it.
-    const Box area = {Vec3(c.x() - reach, c.y() - reach, 0.0), Vec3(c.x() + reach, c.y() + reach, c.z() + 4.0 * reach)};
-    colony.cells_meeting(area, ws_.ids);
-    std::erase(ws_.ids, task.cell_id);
-    ws_.bodies.clear();
-    ws_.by_gap.clear();
-    for (const CellId id : ws_.ids) {
-      const Body& body = colony.body(id);
-      ws_.bodies.push_back(&body);
-      const Box& box = body.box();
-      const double gap = std::max({box.low.x() - c.x(), c.x() - box.high.x(), box.low.y() - c.y(), c.y() - box.high.y()});
-      ws_.by_gap.push_back({static_cast<float>(gap), id, &body});
-    }
-    std::sort(ws_.by_gap.begin(), ws_.by_gap.end(), [](const auto& a, const auto& b) { return std::tie(a.gap_um, a.id) < std::tie(b.gap_um, b.id); });
-    kernel::SearchScene& scene = ws_.scene;
-    ws_.voxels.centre_on(c);
-    scene.counts = ws_.voxels.counts();
-    scene.voxels_x = static_cast<float>(ws_.voxels.nx());
-    scene.empty_cube = static_cast<float>(ws_.voxels.empty_cube());
-    scene.voxels_per_um = static_cast<float>(1.0 / ws_.voxels.edge_um());
-    const Vec3 shift = (c - ws_.voxels.corner_um()) / ws_.voxels.edge_um() - Vec3::Constant(0.5);
-    for (int i = 0; i < 3; ++i) scene.voxel_shift[i] = static_cast<float>(shift[i]);
-    scene.dish_z = static_cast<float>(-c.z());
-    scene.has_wall = false;
-    if (params.dish.radius_um) {
-      const double radius = *params.dish.radius_um;
-      scene.has_wall = std::sqrt(c.x() * c.x() + c.y() * c.y()) + std::sqrt(2.0) * reach > radius;
-      scene.wall_x = static_cast<float>(-c.x());
-      scene.wall_y = static_cast<float>(-c.y());
-      scene.wall_radius2 = static_cast<float>(radius * radius);
-    }
-    // In the order of the sequence: every prefix is a fair sample.
-    scrambled_sobol(static_cast<std::uint32_t>(params.search.points), seeds_for(task, Purpose::kSearchPoints, 0), ws_.points);
-    for (std::size_t k = 0; k < 2; ++k) {
-      // Only the noise of this body counts: its place and shape are the candidate's.
-      const Body noise_of({Vec3::Zero(), Vec3::Ones(), Vec3::Zero(), task.frame.noise_offsets[k]}, params.noise);
-      ws_.candidate[k].field = kernel::FloatBody(noise_of, Vec3::Zero());
-      kernel::select_own_points(ws_.candidate[k].field, static_cast<float>(noise_of.noisy_scale()), ws_.points, scene.own[k]);
-    }
-    if (params.contact.neighbour_retained_min > 0.0) {
-      tiled_sobol(static_cast<std::uint32_t>(params.search.points), seeds_for(task, Purpose::kRetained, 0), ws_.retained_points);
-    }
-    ws_.overlap.work = {};
-  }
-
-  /// From here on a candidate is given up once it cannot beat `best` any more: after h hits, when more are shared than
-  ///     h (1 - best) + kDropDeviations sqrt(h best (1 - best)) + 1/2.
-  /// A candidate whose true fitness is `best` shares a binomial number with mean h (1 - best) (Sobol points vary less), so it is given
-  /// up with probability below 7 % at each of the two looks; one that would be better by d is safer by d sqrt(h / best (1 - best)).
-  void race_to(double best) {
-    const std::size_t n = std::max(ws_.scene.own[0].size(), ws_.scene.own[1].size());
-    ws_.most_shared.resize(n + 1);
-    for (std::size_t h = 0; h <= n; ++h) {
-      const auto hits = static_cast<double>(h);
-      ws_.most_shared[h] =
-          static_cast<std::uint32_t>(hits * (1.0 - best) + kDropDeviations * std::sqrt(hits * best * (1.0 - best)) + 0.5);
-    }
-    racing_ = best > 0.0;
-  }
-
-  /// Scores every candidate without a score, on the points of the search. One that is given up gets a fitness below the best.
-  void score_all(std::vector<Candidate>& candidates) {
-    std::size_t count = 0;
-    for (const Candidate& candidate : candidates) count += candidate.fitness < 0.0 ? 1 : 0;
-    if (ws_.threads == 1 || !is_worth_threads(count)) {
-      for (Candidate& candidate : candidates) {
-        if (candidate.fitness < 0.0) candidate.fitness = score(candidate.chromosome, ws_.candidate, ws_.overlap.work);
-      }
-      return;
-    }
-    // The voxels are filled first, for all of them: then scoring changes nothing but its own slot, and a slot's value does not depend on who
-    // scores it or when. Isolated: a thread that waits here must not begin another event.
-    for (const Candidate& candidate : candidates) {
-      ws_.genes.decode(candidate.chromosome, task_.frame, ws_.candidate);
-      cover(std::max(ws_.candidate[0].reach, ws_.candidate[1].reach));
-    }
-    ws_.work_of.assign(candidates.size(), {});
-    tbb::this_task_arena::isolate([&] {
-      tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t i) {
-        if (!(candidates[i].fitness < 0.0)) return;
-        std::array<kernel::CandidateBody, 2> bodies = ws_.candidate;
-        candidates[i].fitness = score(candidates[i].chromosome, bodies, ws_.work_of[i]);
-      });
-    });
-    for (const kernel::CountWork& work : ws_.work_of) ws_.overlap.work += work;
-  }
-
-  /// On the fresh points, by the definition.
-  double score_finally(const Pair& pair, bool& crosses_wall) {
-    tiled_sobol(static_cast<std::uint32_t>(params_.search.points_final), seeds_for(task_, Purpose::kFinalPoints, 0), ws_.final_points);
-    const std::array<Body, 2> bodies = {Body(pair.bodies[0], params_.noise), Body(pair.bodies[1], params_.noise)};
-    double fitness = 1.0;
-    crosses_wall = false;
-    for (std::size_t k = 0; k < 2; ++k) {
-      ws_.near.clear();
-      ws_.near.push_back(&bodies[1 - k]);
-      const Box own = bodies[k].box();
-      for (const Workspace::Neighbour& other : ws_.by_gap) {
-        if (meets(other.body->box(), own)) ws_.near.push_back(other.body);
-      }
-      count_overlaps(bodies[k], ws_.near, params_.dish.radius_um, ws_.final_points, ws_.overlap, ws_.counts);
-      fitness = std::min(fitness, ws_.counts.fitness());
-      crosses_wall = crosses_wall || ws_.counts.outside_wall_count > 0;
-    }
-    if (fitness > 0.0 && params_.contact.neighbour_retained_min > 0.0) {
-      // Neighbours are judged on fresh points too.
-      tiled_sobol(static_cast<std::uint32_t>(params_.search.points_final), seeds_for(task_, Purpose::kRetained, 1), ws_.retained_points);
-      if (!neighbours_keep_enough(bodies)) return 0.0;
-    }
-    return fitness;
-  }
-
- private:
-  // About 1.5 ns a point of the search and candidate; asking neighbours what they keep costs far more. Handing work to a thread costs some
-  // microseconds: at the defaults (32 candidates of 256 points, 10 us) it would only cost.
-  bool is_worth_threads(std::size_t candidate_count) const {
-    return candidate_count > 1 && (params_.contact.neighbour_retained_min > 0.0 ||
-                                   candidate_count * static_cast<std::size_t>(params_.search.points) >= kPointsWorthThreads);
-  }
-
-  double score(const Chromosome& chromosome, std::array<kernel::CandidateBody, 2>& candidate, kernel::CountWork& work) {
-    ws_.genes.decode(chromosome, task_.frame, candidate);
-    const kernel::ShareLimit limit = racing_ ? kernel::ShareLimit(ws_.most_shared) : kernel::ShareLimit();
-    cover(std::max(candidate[0].reach, candidate[1].reach));
-    const kernel::PairScore score = kernel::score_pair(ws_.scene, candidate, limit, work);
-    if (score.beyond_wall) return 0.0;
-    double fitness = 1.0;
-    for (std::size_t k = 0; k < 2; ++k) {
-      if (score.hits[k] == 0 && score.dropped) continue;  // not looked at
-      fitness = std::min(fitness, share_left(score.hits[k], score.shared[k]));
-    }
-    if (score.dropped || !(fitness > 0.0) || !(params_.contact.neighbour_retained_min > 0.0)) return fitness;
-    const Pair pair = decode(chromosome, task_.frame, params_);
-    const std::array<Body, 2> bodies = {Body(pair.bodies[0], params_.noise), Body(pair.bodies[1], params_.noise)};
-    return neighbours_keep_enough(bodies) ? fitness : 0.0;
-  }
-
-  // Puts into the voxels every neighbour that a body of this reach can meet.
-  void cover(float reach_um) {
-    // The margin is for rounding alone.
-    for (; covered_ < ws_.by_gap.size() && ws_.by_gap[covered_].gap_um <= 1.0001F * reach_um + 0.001F; ++covered_) {
-      const Workspace::Neighbour& other = ws_.by_gap[covered_];
-      ws_.voxels.add(ws_.rasters.of(other.id, *other.body, ws_.overlap.work.field_count));
-    }
-  }
-
-  bool neighbours_keep_enough(const std::array<Body, 2>& bodies) {
-    const std::array<const Body*, 2> added = {&bodies[0], &bodies[1]};
-    for (std::size_t j = 0; j < ws_.ids.size(); ++j) {
-      const Box& box = ws_.bodies[j]->box();
-      if (!meets(box, bodies[0].box()) && !meets(box, bodies[1].box())) continue;
-      const double share = retained_share(colony_, params_.contact.rule, ws_.ids[j], task_.cell_id, added, ws_.retained_points);
-      if (share >= params_.contact.neighbour_retained_min) continue;
-      // A neighbour pressed below the minimum before refuses only pairs that press it further.
-      const double before = retained_share(colony_, params_.contact.rule, ws_.ids[j], std::nullopt, {}, ws_.retained_points);
-      if (share < before) return false;
-    }
-    return true;
-  }
-
-  const Colony& colony_;
-  const Params& params_;
-  const SearchTask& task_;
-  Workspace& ws_;
-  bool racing_ = false;
-  std::size_t covered_ = 0;   // of by_gap: those in the voxels
-};
 
 class Search {
  public:
@@ -221,10 +30,9 @@ class Search {
     SearchResult result;
     result.pair = decode(best_.chromosome, task_.frame, params_);
     result.search_fitness = best_.fitness;
-    result.fitness = scorer_.score_finally(result.pair, result.crosses_wall);
+    result.fitness = scorer_.score_finally(result.pair, result.crosses_wall, result.supported);
     result.evaluation_count = evaluation_count_;
     result.corrected = corrected_;
-    result.work = {1, evaluation_count_, ws_.overlap.work.field_count, ws_.overlap.work.noise_count};
     return result;
   }
 
@@ -245,7 +53,7 @@ class Search {
       if (candidates[i].fitness > candidates[best].fitness) best = i;
     }
     best_ = candidates[best];
-    scorer_.race_to(best_.fitness);
+    if (task_.racing) scorer_.race_to(best_.fitness);
   }
 
   void predict() {
@@ -255,6 +63,10 @@ class Search {
     Stream first = stream(0);
     for (std::size_t i = 0; i < population_size_; ++i) population.push_back({random_chromosome(gene_count_, bits(), first), kUnscored});
     population[0].chromosome.set_code(kTurn, code_of(0.5, bits(), params_.search.coding));  // the unturned plane
+    // With layers, both on the dish: where nobody else is near, one population in ten has no other supported pair to breed from.
+    for (int gene = kFirstHeight; gene < gene_count_; ++gene) {
+      population[0].chromosome.set_code(gene, code_of(0.0, bits(), params_.search.coding));
+    }
     evaluate(population, 0);
     hopeless_ = is_hopeless(0);
     for (std::int64_t generation = 1; generation <= params_.search.generations && !good() && !hopeless_; ++generation) {

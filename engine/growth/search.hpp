@@ -25,19 +25,20 @@ struct SearchTask {
   CellId cell_id;               // the dividing cell: not a neighbour of its own daughters
   std::uint32_t ordinal = 0;
   PairFrame frame;
+  bool racing = true;           // false: every candidate is scored on all points, for tests of what giving candidates up costs
 };
 
 struct SearchResult {
   Pair pair;                    // the winner
-  double fitness = 0.0;         // on the fresh points
+  double fitness = 0.0;         // on the fresh points (the first kLookPoints of them where the pair fails by far)
   double search_fitness = 0.0;  // on the points of the search
   std::uint32_t evaluation_count = 0;
   bool corrected = false;
   bool crosses_wall = false;    // the winner reaches beyond the dish (on the fresh points): nothing better was found
-  Work work;
+  bool supported = true;        // with several layers, on the fresh points (support.hpp); if not, the fitness is 0
 };
 
-/// `workspace` must be made from the same parameters. Throws Stopped when asked to (looked at before every generation).
+/// `workspace` must be made from the same parameters; its overlap.work grows by what the search takes. Throws Stopped when asked to (looked at before every generation).
 SearchResult find_space(const Colony& colony, const Params& params, const SearchTask& task, Workspace& workspace,
                         StopFlag stop = nullptr);
 /// The same with a workspace of its own.

@@ -43,16 +43,20 @@ kernel::Cover cover_of(const Body& body, const Vec3& origin_um, bool ball) {
   return cover;
 }
 
-double horizontal_distance_um(const Vec3& point, const Box& box) {
-  const double dx = std::max({box.low.x() - point.x(), 0.0, point.x() - box.high.x()});
-  const double dy = std::max({box.low.y() - point.y(), 0.0, point.y() - box.high.y()});
-  return std::sqrt(dx * dx + dy * dy);
+// In the plane (axis_count 2) or in space (3).
+double distance_um(const Vec3& point, const Box& box, int axis_count) {
+  double sum = 0.0;
+  for (int i = 0; i < axis_count; ++i) {
+    const double d = std::max({box.low[i] - point[i], 0.0, point[i] - box.high[i]});
+    sum += d * d;
+  }
+  return std::sqrt(sum);
 }
 
 }  // namespace
 
 double free_share(const Colony& colony, const Params& params, Seed seed, const Cell& cell, std::uint32_t ordinal,
-                  const BodyChange& change) {
+                  const BodyChange& change, kernel::CountWork* work) {
   const double radius = params.wake.free_radius_um;
   const bool ball = params.layers == Layers::kMulti;
   std::vector<CellId> ids;
@@ -83,25 +87,28 @@ double free_share(const Colony& colony, const Params& params, Seed seed, const C
     ++n;
   }
   CHECK(n > 0);
+  if (work != nullptr) work->cover_count += n * covers.size();
   return static_cast<double>(kernel::count_uncovered(covers, points.x.data(), points.y.data(), points.z.data(), n)) / static_cast<double>(n);
 }
 
-std::vector<Woken> wake_sleepers(const Colony& colony, const Params& params, Seed seed, double time_h, const BodyChange& change) {
+std::vector<Woken> wake_sleepers(const Colony& colony, const Params& params, Seed seed, double time_h, const BodyChange& change,
+                                 kernel::CountWork* work) {
   const double radius = params.wake.free_radius_um;
   std::vector<Box> changed;
   if (change.gone) changed.push_back(colony.body(*change.gone).box());
-  if (params.wake.rule == WakeRule::kAlways) {
+  if (params.wake.rule == WakeRule::kAlways || params.wake.gain == 0.0) {
     for (const Body& body : change.bodies) changed.push_back(body.box());
   }
-  // Rule `share`: only what has gone makes room. Where nothing went, the share is at most what it was when last looked at, and then it had
+  // Rule `share` with a gain above 0: only what has gone makes room. Where nothing went, the share is at most what it was when last looked at, and then it had
   // not grown enough; so nobody there is looked at again.
   if (changed.empty()) return {};
 
   Box area = changed.front();
   for (const Box& box : changed) area = {area.low.cwiseMin(box.low), area.high.cwiseMax(box.high)};
   // A sleeper's own box holds its centre, so every sleeper whose centre is near meets the widened area.
+  const bool ball = params.layers == Layers::kMulti;
   area.low -= Vec3(radius, radius, 0.0);
-  area.high += Vec3(radius, radius, 0.0);
+  area.high += Vec3(radius, radius, ball ? radius : 0.0);
   area.low.z() = 0.0;
   std::vector<CellId> ids;
   colony.cells_meeting(area, ids);
@@ -111,10 +118,10 @@ std::vector<Woken> wake_sleepers(const Colony& colony, const Params& params, See
     const Cell& cell = colony.cell(id);
     if (cell.activity != Activity::kPassive || cell.due_h || (change.gone && id == *change.gone)) continue;
     const bool near = std::any_of(changed.begin(), changed.end(), [&](const Box& box) {
-      return horizontal_distance_um(cell.centre_um, box) <= radius;
+      return distance_um(cell.centre_um, box, ball ? 3 : 2) <= radius;
     });
     if (!near) continue;
-    const double share = free_share(colony, params, seed, cell, cell.ordinal, change);
+    const double share = free_share(colony, params, seed, cell, cell.ordinal, change, work);
     if (params.wake.rule == WakeRule::kShare && !(share >= *cell.free_share + params.wake.gain)) continue;
     woken.push_back({id, share, time_h + params.wake.retry_h});
   }

@@ -14,6 +14,7 @@
 
 #include "engine/model/colony.hpp"
 #include "engine/random/stream.hpp"
+#include "engine/space/overlap_kernel.hpp"
 
 namespace colony {
 
@@ -25,12 +26,14 @@ struct BodyChange {
   std::span<const Body> bodies;
 };
 
-/// Free share around `cell` (its centre), on the points of `ordinal`, as it will be after `change`.
+/// Free share around `cell` (its centre), on the points of `ordinal`, as it will be after `change`. Here and below: `work`, if any, grows
+/// by what it takes.
 double free_share(const Colony& colony, const Params& params, Seed seed, const Cell& cell, std::uint32_t ordinal,
-                  const BodyChange& change);
+                  const BodyChange& change, kernel::CountWork* work = nullptr);
 
-/// The sleeping cells (passive, nothing due) with a changed body within free_radius_um of their centre (horizontal distance to its
-/// box), except `change.gone`, whose surroundings gained room by wake.gain (rule `share`) or at all events (rule `always`). Ascending.
-std::vector<Woken> wake_sleepers(const Colony& colony, const Params& params, Seed seed, double time_h, const BodyChange& change);
+/// The sleeping cells (passive, nothing due) with a changed body within free_radius_um of their centre (distance to its box, in the plane
+/// or, with layers, in space), except `change.gone`, whose surroundings gained room by wake.gain (rule `share`) or at all events (rule `always`). Ascending.
+std::vector<Woken> wake_sleepers(const Colony& colony, const Params& params, Seed seed, double time_h, const BodyChange& change,
+                                 kernel::CountWork* work = nullptr);
 
 }  // namespace colony

@@ -17,17 +17,16 @@
 
 namespace colony {
 
-/// What deciding took.
-struct Work {
+/// What deciding took: searches, isolation tests, settlings, moves and free shares alike. Not counted: the placing of founders,
+/// neighbour_retained_min (0 in every preset), and the few evaluations in double precision (a move's freer half). What is one
+/// evaluation: see kernel::CountWork.
+struct Work : kernel::CountWork {
   std::uint64_t search_count = 0;
   std::uint64_t candidate_count = 0;    // candidate pairs, scored wholly or in part
-  std::uint64_t field_count = 0;        // evaluations of one body's field at one point
-  std::uint64_t noise_count = 0;        // of those, how many needed the noise
   Work& operator+=(const Work& other) {
+    CountWork::operator+=(other);
     search_count += other.search_count;
     candidate_count += other.candidate_count;
-    field_count += other.field_count;
-    noise_count += other.noise_count;
     return *this;
   }
 };

@@ -139,7 +139,9 @@ class CrossCheck {
       errors_.push_back({"/window_h", "must be at most " + text_of(move_delay_min_h(p.motility)) +
                                           " h, the shortest time between two moves at this motility.rate_per_h"});
     }
-    if (sound({"/layers"}) && p.layers != Layers::kMono) errors_.push_back({"/layers", "only mono is simulated by this version"});
+    if (moves && sound({"/layers"}) && p.layers == Layers::kMulti) {
+      errors_.push_back({"/motility/rate_per_h", "must be 0 where layers is multi: moves are simulated in one layer only"});
+    }
   }
 
  private:
@@ -158,7 +160,7 @@ class CrossCheck {
   const std::size_t own_count_;  // of the range errors, which come first
 };
 
-constexpr std::array<std::string_view, 3> kPresets = {"paper", "young-colony", "clonogenic"};
+constexpr std::array<std::string_view, 4> kPresets = {"paper", "young-colony", "clonogenic", "tumour"};
 
 }  // namespace
 
@@ -168,6 +170,7 @@ std::string_view preset_text(std::string_view name) {
   if (name == "paper") return "one cell grows into a contact-inhibited monolayer, with the parameters of the paper";
   if (name == "young-colony") return "as paper, but the cells crawl: a young colony whose cells stand almost separately";
   if (name == "clonogenic") return "100 founders over a disc of a 96-well plate's well: separate colonies in one dish";
+  if (name == "tumour") return "as paper, but cells pile up in several layers and divide without a generation limit";
   return {};
 }
 
@@ -183,6 +186,11 @@ std::optional<Params> preset(std::string_view name) {
     params.dish.radius_um = 3200.0;
     params.founders.count = 100;
     params.founders.radius_um = 2500.0;
+    return params;
+  }
+  if (name == "tumour") {
+    params.division.generation_limit = std::nullopt;
+    params.layers = Layers::kMulti;
     return params;
   }
   return std::nullopt;

@@ -60,7 +60,7 @@ struct SearchParams {
   std::int64_t population = 32;
   std::int64_t generations = 12;
   std::int64_t corrector_generations = 4;
-  std::optional<double> give_up_margin = 0.26;   // none: no search is given up
+  std::optional<double> give_up_margin = 0.28;   // none: no search is given up
   Coding coding = Coding::kGray;
   std::int64_t bits = 8;
   Selection selection = Selection::kTournament;
@@ -141,7 +141,7 @@ struct ParamInfo {
 /// All parameters, in the order of the documentation.
 std::span<const ParamInfo> param_table();
 
-/// "paper", "young-colony", "clonogenic"; those that need what this version does not simulate are absent.
+/// "paper", "young-colony", "clonogenic", "tumour".
 std::span<const std::string_view> preset_names();
 /// One line about a preset, for people.
 std::string_view preset_text(std::string_view name);

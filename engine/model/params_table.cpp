@@ -101,7 +101,7 @@ const std::vector<ParamInfo>& table() {
        COLONY_FIELD(motility.rate_per_h, double)},
       {"motility.step_um", "um", 0.1, 20, false, "length of a move; judged where it ends, so a long one can lead past a neighbour", COLONY_FIELD(motility.step_um, double)},
       {"motility.bias", "", 0, 1, false, "probability that a move is directed to the freer half of the surroundings (wake.free_radius_um)", COLONY_FIELD(motility.bias, double)},
-      {"layers", "", 0, 0, false, "monolayer, or several layers; only mono in this version",
+      {"layers", "", 0, 0, false, "monolayer (mono), or layers: cells stand up to 2 C higher, on the dish or on other cells (multi; without moves)",
        COLONY_ENUM(layers, Layers, "mono", "multi")},
       {"dish.radius_um", "um", 20, 50000, false, "radius of the dish's wall; null = no wall", COLONY_FIELD(dish.radius_um, MaybeReal)},
       {"founders.count", "", 1, static_cast<double>(kFoundersMax), false, "founding cells", COLONY_FIELD(founders.count, Whole)},

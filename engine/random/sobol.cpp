@@ -65,7 +65,6 @@ constexpr Columns make_columns() {
 }
 
 constexpr Columns kColumns = make_columns();
-constexpr std::uint32_t kPointsMax = 65536;
 
 std::uint32_t reverse_bits(std::uint32_t x) {
   x = ((x >> 1) & 0x55555555U) | ((x & 0x55555555U) << 1);
@@ -90,9 +89,9 @@ const Reversed& reversed_points() {
     Reversed made;
     for (int d = 0; d < 3; ++d) {
       auto& column = made[static_cast<std::size_t>(d)];
-      column.resize(kPointsMax + kScramblePadding);
+      column.resize(kSobolPointsMax + kScramblePadding);
       // Point i is point i without its lowest bit, and that bit's direction.
-      for (std::uint32_t i = 1; i < kPointsMax; ++i) {
+      for (std::uint32_t i = 1; i < kSobolPointsMax; ++i) {
         const auto bit = static_cast<std::size_t>(std::countr_zero(i));
         column[i] = column[i & (i - 1)] ^ reverse_bits(kColumns[static_cast<std::size_t>(d)][bit]);
       }
@@ -160,12 +159,12 @@ std::uint32_t owen_scramble(std::uint32_t value, std::uint32_t seed) {
 }
 
 void scrambled_sobol(std::uint32_t n, const std::array<std::uint32_t, 3>& seeds, PointSet& out) {
-  CHECK(n >= 1 && n <= kPointsMax && (n & (n - 1)) == 0);
+  CHECK(n >= 1 && n <= kSobolPointsMax && (n & (n - 1)) == 0);
   scramble(reversed_points(), 0, n, seeds, out);
 }
 
 void tiled_sobol(std::uint32_t n, const std::array<std::uint32_t, 3>& seeds, PointSet& out) {
-  CHECK(n >= 1 && n <= kPointsMax && (n & (n - 1)) == 0);
+  CHECK(n >= 1 && n <= kSobolPointsMax && (n & (n - 1)) == 0);
   scramble(tiled_points_of(n), 0, n, seeds, out);
 }
 

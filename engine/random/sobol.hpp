@@ -17,6 +17,7 @@
 namespace colony {
 
 inline constexpr int kSobolDimensions = 21;
+inline constexpr std::uint32_t kSobolPointsMax = 65536;   // of a point set
 
 /// Coordinate `dimension` (from 0) of point `index` (from 0, the origin), as a 32-bit fraction. Not scrambled, not Gray-coded:
 /// the first 2^m points are the same set in either order.

@@ -31,6 +31,7 @@ enum class Purpose : std::uint8_t {
   kMove = 15,            // of a move: guided or not, and the direction
   kMoveSurroundings = 16,  // scrambling of the disc in which a move looks for the freer half
   kMovePoints = 17,      // scrambling of the points on which a moved body is scored
+  kSplitPerpendicular = 18,  // several layers: which of the planes through nucleus centre and nearest membrane point
   kControl = 32,         // places of the discs of a random control; no part of any history
 };
 
@@ -53,9 +54,9 @@ class Stream {
   /// Uniform in 0..n-1 without bias; n >= 1.
   std::uint32_t below(std::uint32_t n) {
     // Lemire's multiply-and-reject: values of the low half under (2^32 mod n) would make some results likelier than others. It is below n,
-    // so the division is needed only when the low half is too.
+    // so the division is needed only when the low half is too. (<= and not <: 0 comes to its CHECK as well.)
     std::uint64_t product = static_cast<std::uint64_t>(next_u32()) * n;
-    if (static_cast<std::uint32_t>(product) < n) product = below_rarely(n, product);
+    if (static_cast<std::uint32_t>(product) <= n) product = below_rarely(n, product);
     return static_cast<std::uint32_t>(product >> 32);
   }
   /// Standard normal (Box-Muller, one value a call).

@@ -1,12 +1,12 @@
 #include "engine/sim/decide.hpp"
 
 #include <array>
+#include <cmath>
 #include <optional>
 #include <vector>
 
 #include "engine/base/check.hpp"
 #include "engine/base/maths.hpp"
-#include "engine/growth/search.hpp"
 #include "engine/growth/splitting.hpp"
 #include "engine/growth/surroundings.hpp"
 #include "engine/model/cycle.hpp"
@@ -46,16 +46,28 @@ bool is_isolated(const Colony& colony, Seed seed, const Cell& cell, Workspace& w
   return true;
 }
 
-Vec3 random_direction(Seed seed, const Cell& cell) {
+// Uniform on the circle of horizontal directions; with several layers, on the sphere.
+Vec3 random_direction(Seed seed, const Cell& cell, Layers layers) {
   Stream stream(seed, cell.id, cell.ordinal, Purpose::kSplitDirection);
   const auto [s, c] = maths::sincos(2.0 * maths::kPi * stream.uniform());
-  return {c, s, 0.0};
+  if (layers == Layers::kMono) return {c, s, 0.0};
+  const double z = 2.0 * stream.uniform() - 1.0;  // Archimedes
+  const double across = std::sqrt(1.0 - z * z);
+  return {across * c, across * s, z};
 }
 
-Vec3 splitting_direction(const Colony& colony, Seed seed, const Cell& cell, Workspace& workspace) {
+Vec3 splitting_direction(const Colony& colony, Layers layers, Seed seed, const Cell& cell, Workspace& workspace) {
   CHECK(cell.nearest_membrane_um.has_value());  // settling comes before every division: validate() sees to it
-  if (is_isolated(colony, seed, cell, workspace)) return random_direction(seed, cell);
-  return splitting_normal(cell.nucleus_um, *cell.nearest_membrane_um).value_or(random_direction(seed, cell));
+  if (is_isolated(colony, seed, cell, workspace)) return random_direction(seed, cell, layers);
+  const Vec3 &c = cell.nucleus_um, &m = *cell.nearest_membrane_um;
+  std::optional<Vec3> normal;
+  if (layers == Layers::kMono) {
+    normal = splitting_normal(c, m);
+  } else {
+    Stream stream(seed, cell.id, cell.ordinal, Purpose::kSplitPerpendicular);
+    normal = splitting_normal(c, m, 2.0 * maths::kPi * stream.uniform());
+  }
+  return normal ? *normal : random_direction(seed, cell, layers);
 }
 
 Vec3 draw_noise_offset(const Params& params, Seed seed, const Cell& parent, std::uint32_t lane) {
@@ -85,14 +97,14 @@ Cell newborn(const BodyGeometry& body, const Cell& parent, double time_h, double
 }
 
 Inhibited inhibited(const Colony& colony, const Params& params, Seed seed, const Cell& cell, double time_h,
-                    const SearchResult& found) {
+                    const SearchResult& found, kernel::CountWork& work) {
   Inhibited event;
   event.fitness = found.fitness;
   event.evaluation_count = found.evaluation_count;
   event.corrected = found.corrected;
   event.try_count = cell.try_count + 1;
   // On the points of the ordinal the cell will have from this event on: those that later estimates will use.
-  event.free_share = free_share(colony, params, seed, cell, cell.ordinal + 1, {});
+  event.free_share = free_share(colony, params, seed, cell, cell.ordinal + 1, {}, &work);
   const bool unlucky = event.free_share > params.wake.free_min && event.try_count <= params.wake.tries_max;
   if (unlucky) {
     Stream stream(seed, cell.id, cell.ordinal, Purpose::kRetry);
@@ -103,24 +115,33 @@ Inhibited inhibited(const Colony& colony, const Params& params, Seed seed, const
 
 }  // namespace
 
-Decision decide_division(const Colony& colony, const Params& params, Seed seed, CellId id, double time_h, Workspace& workspace,
-                         StopFlag stop) {
+SearchTask search_task(const Colony& colony, const Params& params, Seed seed, CellId id, Workspace& workspace) {
   const Cell& parent = colony.cell(id);
-  if (params.division.generation_limit && parent.generation >= *params.division.generation_limit) return {Senesced{}, {}};
-
   SearchTask task;
   task.seed = seed;
   task.cell_id = id;
   task.ordinal = parent.ordinal;
   task.frame.pivot_um = parent.nucleus_um;
-  task.frame.direction = splitting_direction(colony, seed, parent, workspace);
+  task.frame.direction = splitting_direction(colony, params.layers, seed, parent, workspace);
   for (std::uint32_t lane = 0; lane < 2; ++lane) {
     task.frame.noise_offsets[lane] = draw_noise_offset(params, seed, parent, lane);
   }
+  return task;
+}
+
+Decision decide_division(const Colony& colony, const Params& params, Seed seed, CellId id, double time_h, Workspace& workspace,
+                         StopFlag stop) {
+  const Cell& parent = colony.cell(id);
+  if (params.division.generation_limit && parent.generation >= *params.division.generation_limit) return {Senesced{}, {}};
+
+  kernel::CountWork& counted = workspace.overlap.work;
+  counted = {};
+  const SearchTask task = search_task(colony, params, seed, id, workspace);
   const SearchResult found = find_space(colony, params, task, workspace, stop);
-  // The dish's wall is hard also where inhibition is off.
-  if (found.crosses_wall || (params.division.inhibition && !(found.fitness >= params.contact.fitness_min))) {
-    return {inhibited(colony, params, seed, parent, time_h, found), found.work};
+  // The dish's wall is hard also where inhibition is off, and nobody floats.
+  if (found.crosses_wall || !found.supported || (params.division.inhibition && !(found.fitness >= params.contact.fitness_min))) {
+    Inhibited event = inhibited(colony, params, seed, parent, time_h, found, counted);
+    return {event, {counted, 1, found.evaluation_count}};
   }
 
   Divided event;
@@ -145,11 +166,12 @@ Decision decide_division(const Colony& colony, const Params& params, Seed seed, 
   event.evaluation_count = found.evaluation_count;
   event.corrected = found.corrected;
   const std::array<Body, 2> bodies = {Body(found.pair.bodies[0], params.noise), Body(found.pair.bodies[1], params.noise)};
-  event.woken = wake_sleepers(colony, params, seed, time_h, {id, bodies});
-  return {event, found.work};
+  event.woken = wake_sleepers(colony, params, seed, time_h, {id, bodies}, &counted);
+  return {event, {counted, 1, found.evaluation_count}};
 }
 
 Decision decide_settling(const Colony& colony, const Params& params, Seed seed, CellId id, Workspace& workspace) {
+  workspace.overlap.work = {};
   const Cell& cell = colony.cell(id);
   const Body& body = colony.body(id);
   const std::vector<const Body*>& neighbours = neighbours_of(colony, id, workspace);
@@ -164,8 +186,9 @@ Decision decide_settling(const Colony& colony, const Params& params, Seed seed, 
   event.due_h = cell.due_h;
   // Inside everywhere in the slab cannot happen for a body within its own box; then the centre stands for m: no plane is fixed.
   event.nearest_membrane_um =
-      nearest_membrane_um(body, neighbours, rule, event.nucleus_um, workspace.points, workspace.overlap).value_or(event.nucleus_um);
-  return {event, {}};
+      nearest_membrane_um(body, neighbours, rule, event.nucleus_um, workspace.points, workspace.overlap, params.layers)
+          .value_or(event.nucleus_um);
+  return {event, {workspace.overlap.work, 0, 0}};
 }
 
 }  // namespace colony

@@ -7,6 +7,7 @@
 #pragma once
 
 #include "engine/base/stop.hpp"
+#include "engine/growth/search.hpp"
 #include "engine/growth/workspace.hpp"
 #include "engine/model/colony.hpp"
 #include "engine/model/event.hpp"
@@ -20,6 +21,9 @@ struct Decision {
   EventBody body;
   Work work;
 };
+
+/// What a division attempt of `id` asks of the search (for benchmarks that ask others of it too).
+SearchTask search_task(const Colony& colony, const Params& params, Seed seed, CellId id, Workspace& workspace);
 
 /// A division attempt of `id` at `time_h`: Divided, Inhibited or Senesced. The daughter's id is left 0: it is given when the
 /// event is committed, in serial order. Throws Stopped when asked to.

@@ -18,8 +18,6 @@ namespace colony {
 namespace {
 
 constexpr std::uint32_t kSurroundingsPoints = 256;
-constexpr std::uint32_t kPrefixPoints = 256;
-constexpr double kHopeless = 0.15;  // five standard errors of fitness on the prefix
 
 /// Unit vector towards the freer half of the disc of free_radius_um about the cell; none where there is no such half: nothing of the
 /// disc is covered, or all of it. The disc's own centroid is the centre, so the centroid of what is free lies opposite to the
@@ -88,11 +86,10 @@ bool fits(const Colony& colony, const Params& params, Seed seed, const Cell& cel
   PointSet& points = workspace.points;
   OverlapScratch& scratch = workspace.overlap;
   OverlapCounts& counts = workspace.counts;
-  if (final_count > kPrefixPoints) {
-    // Most moves of enclosed cells fail by far: the first points of the same set tell, at a fraction of the cost.
-    scrambled_sobol(kPrefixPoints, seeds, points);
+  if (final_count > kLookPoints) {
+    scrambled_sobol(kLookPoints, seeds, points);
     count_overlaps(moved, neighbours, params.dish.radius_um, points, scratch, counts);
-    if (counts.outside_wall_count > 0 || counts.fitness() < params.contact.fitness_min - kHopeless) return false;
+    if (counts.outside_wall_count > 0 || counts.fitness() < params.contact.fitness_min - kLookMargin) return false;
   }
   tiled_sobol(final_count, seeds, points);
   count_overlaps(moved, neighbours, params.dish.radius_um, points, scratch, counts);
@@ -105,9 +102,9 @@ bool is_asleep(const Cell& cell) { return cell.activity == Activity::kPassive &&
 /// the points of its new ordinal: recorded share plus the difference of the two samples, both asked of the colony as it is now, so
 /// that growth goes on being a change of the colony, not of the sample.
 void look_around(const Colony& colony, const Params& params, Seed seed, double time_h, const BodyChange& change,
-                 const Cell& before, Cell& moved) {
+                 const Cell& before, Cell& moved, kernel::CountWork& work) {
   CHECK(before.free_share.has_value());
-  const double share = free_share(colony, params, seed, moved, before.ordinal, change);
+  const double share = free_share(colony, params, seed, moved, before.ordinal, change, &work);
   const bool made = change.gone.has_value();
   if (made && (params.wake.rule == WakeRule::kAlways || share >= *before.free_share + params.wake.gain)) {
     moved.free_share = share;
@@ -115,13 +112,15 @@ void look_around(const Colony& colony, const Params& params, Seed seed, double t
     moved.try_count = 0;  // as for any sleeper that is woken
     return;
   }
-  const double restated = *before.free_share + (free_share(colony, params, seed, moved, moved.ordinal, change) - share);
+  const double restated = *before.free_share + (free_share(colony, params, seed, moved, moved.ordinal, change, &work) - share);
   moved.free_share = std::clamp(restated, 0.0, 1.0);
 }
 
 }  // namespace
 
 Decision decide_move(const Colony& colony, const Params& params, Seed seed, CellId id, double time_h, Workspace& workspace) {
+  kernel::CountWork& counted = workspace.overlap.work;
+  counted = {};
   const Cell& before = colony.cell(id);
   Moved event;
   event.cell = before;
@@ -140,10 +139,10 @@ Decision decide_move(const Colony& colony, const Params& params, Seed seed, Cell
     event.cell.nucleus_um += step;
     if (event.cell.nearest_membrane_um) *event.cell.nearest_membrane_um += step;
     change = {id, std::span<const Body>(&body, 1)};
-    event.woken = wake_sleepers(colony, params, seed, time_h, change);
+    event.woken = wake_sleepers(colony, params, seed, time_h, change, &counted);
   }
-  if (is_asleep(before)) look_around(colony, params, seed, time_h, change, before, event.cell);
-  return {event, {}};
+  if (is_asleep(before)) look_around(colony, params, seed, time_h, change, before, event.cell, counted);
+  return {event, {counted, 0, 0}};
 }
 
 double draw_move_delay_h(const MotilityParams& motility, Stream& stream) {

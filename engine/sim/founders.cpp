@@ -18,8 +18,6 @@ namespace {
 
 constexpr std::uint32_t kTriesMax = 1000;
 constexpr std::size_t kErrorsMax = 20;
-constexpr std::uint32_t kPrefixPoints = 256;
-constexpr double kHopeless = 0.15;  // five standard errors of fitness on the prefix
 constexpr double kRadiansPerDegree = maths::kPi / 180.0;
 
 class FounderPlacer {
@@ -131,13 +129,12 @@ class FounderPlacer {
     const std::array<std::uint32_t, 3> seeds = {stream.next_u32(), stream.next_u32(), stream.next_u32()};
     const auto final_count = static_cast<std::uint32_t>(params_.search.points_final);
     PointSet points;
-    if (final_count > kPrefixPoints) {
-      // Most tries in a crowded disc fail by far: the first points of the same set tell, at a fraction of the cost.
-      scrambled_sobol(kPrefixPoints, seeds, points);
+    if (final_count > kLookPoints) {
+      scrambled_sobol(kLookPoints, seeds, points);
       count_overlaps(body, neighbours, params_.dish.radius_um, points, scratch_, counts);
-      if (counts.fitness() < params_.contact.fitness_min - kHopeless) return counts;
+      if (counts.fitness() < params_.contact.fitness_min - kLookMargin) return counts;
     }
-    scrambled_sobol(final_count, seeds, points);
+    tiled_sobol(final_count, seeds, points);
     count_overlaps(body, neighbours, params_.dish.radius_um, points, scratch_, counts);
     return counts;
   }

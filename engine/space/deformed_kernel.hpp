@@ -2,7 +2,7 @@
 // Method:  single precision relative to an origin near the points; noise only where it can decide.
 // Why the same bits everywhere: as overlap_kernel.hpp; the sum over neighbours runs in their order for every point.
 // Shapes:  arrays of n, readable (finite values) kPadding beyond n.
-// Threads: pure.
+// Threads: pure but for the caller's CountWork.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,7 @@ namespace colony::kernel {
 
 /// flags[i] = 1 where f~ >= 0 at point i, else 0. All bodies are relative to the origin of the points. `largest_only`: rule `max`.
 void flag_deformed(const FloatBody& body, std::span<const FloatBody> neighbours, bool largest_only, const float* x, const float* y,
-                   const float* z, std::size_t n, std::uint8_t* flags);
+                   const float* z, std::size_t n, std::uint8_t* flags, CountWork* work = nullptr);
 /// The twin of one point in plain C++, noise always evaluated.
 bool is_in_deformed_reference(const FloatBody& body, std::span<const FloatBody> neighbours, bool largest_only, float x, float y, float z);
 

@@ -19,10 +19,12 @@ HWY_INLINE void store_flags(M mask, std::size_t count, std::uint8_t* flags) {
 }
 
 void flag_deformed_kernel(const FloatBody& body, std::span<const FloatBody> neighbours, bool largest_only, const float* HWY_RESTRICT x,
-                          const float* HWY_RESTRICT y, const float* HWY_RESTRICT z, std::size_t n, std::uint8_t* HWY_RESTRICT flags) {
+                          const float* HWY_RESTRICT y, const float* HWY_RESTRICT z, std::size_t n, std::uint8_t* HWY_RESTRICT flags,
+                          CountWork& work) {
   const D d;
   const std::size_t lanes = hn::Lanes(d);
   const V zero = hn::Zero(d);
+  work.field_count += n;
   for (std::size_t i = 0; i < n; i += lanes) {
     const std::size_t count = n - i < lanes ? n - i : lanes;
     const V px = hn::LoadU(d, x + i);
@@ -37,6 +39,7 @@ void flag_deformed_kernel(const FloatBody& body, std::span<const FloatBody> neig
       store_flags(maybe, count, flags + i);
       continue;
     }
+    work.field_count += count * neighbours.size();
     V taken = zero;
     for (const FloatBody& other : neighbours) {
       const V ou = row(other.m, other.t[0], px, py, pz);
@@ -45,13 +48,16 @@ void flag_deformed_kernel(const FloatBody& body, std::span<const FloatBody> neig
       const V other_smooth = smooth_field(ou, ov, ow);
       const auto near = hn::And(maybe, hn::Ge(other_smooth, constant(-other.band)));
       if (hn::AllFalse(d, near)) continue;
+      work.noise_count += hn::CountTrue(d, near);
       const V field = hn::Add(other_smooth, noise(other, ou, ov, ow));
       const V takes = hn::IfThenElseZero(hn::And(near, hn::Gt(field, zero)), field);
       taken = largest_only ? hn::IfThenElse(hn::Gt(takes, taken), takes, taken) : hn::Add(taken, takes);
     }
     const auto alone = hn::Not(hn::Gt(taken, zero));
     auto inside = hn::And(alone, hn::Gt(smooth, constant(body.band)));
-    if (!hn::AllFalse(d, hn::AndNot(inside, maybe))) {
+    const auto undecided = hn::AndNot(inside, maybe);
+    if (!hn::AllFalse(d, undecided)) {
+      work.noise_count += hn::CountTrue(d, undecided);
       const V field = hn::Sub(hn::Add(smooth, noise(body, u, v, w)), taken);
       inside = hn::And(maybe, hn::Or(inside, hn::Ge(field, zero)));
     }
@@ -122,8 +128,9 @@ HWY_EXPORT(nearest_unflagged_kernel);
 HWY_EXPORT(count_uncovered_kernel);
 
 void flag_deformed(const FloatBody& body, std::span<const FloatBody> neighbours, bool largest_only, const float* x, const float* y,
-                   const float* z, std::size_t n, std::uint8_t* flags) {
-  HWY_DYNAMIC_DISPATCH(flag_deformed_kernel)(body, neighbours, largest_only, x, y, z, n, flags);
+                   const float* z, std::size_t n, std::uint8_t* flags, CountWork* work) {
+  CountWork unused;
+  HWY_DYNAMIC_DISPATCH(flag_deformed_kernel)(body, neighbours, largest_only, x, y, z, n, flags, work != nullptr ? *work : unused);
 }
 
 std::size_t nearest_unflagged(const float* x, const float* y, const float* z, std::size_t n, const std::uint8_t* flags) {

@@ -97,8 +97,7 @@ void count_overlaps(const Body& body, std::span<const Body* const> neighbours, s
   hold(s.inside_y, n);
   hold(s.inside_z, n);
   out.hit_count = kernel::select_inside(FloatBody(body, placement.origin), s.x.data(), s.y.data(), s.z.data(), n, s.band,
-                                        s.inside_x.data(), s.inside_y.data(), s.inside_z.data());
-  s.work.field_count += n;
+                                        s.inside_x.data(), s.inside_y.data(), s.inside_z.data(), &s.work);
   s.shared.resize(s.bodies.size());
   kernel::count_each(s.bodies, s.inside_x.data(), s.inside_y.data(), s.inside_z.data(), out.hit_count, s.shared.data(), s.work);
   for (std::size_t k = 0; k < s.bodies.size(); ++k) out.shared_counts[s.indices[k]] = s.shared[k];
@@ -157,8 +156,9 @@ bool touches(const Body& a, const Body& b, const PointSet& points, OverlapScratc
   hold(s.inside_y, points.size());
   hold(s.inside_z, points.size());
   const std::uint32_t in_a = kernel::select_inside(FloatBody(a, placement.origin), s.x.data(), s.y.data(), s.z.data(), points.size(), s.band,
-                                                   s.inside_x.data(), s.inside_y.data(), s.inside_z.data());
-  return kernel::count_inside(FloatBody(b, placement.origin), s.inside_x.data(), s.inside_y.data(), s.inside_z.data(), in_a, s.band) > 0;
+                                                   s.inside_x.data(), s.inside_y.data(), s.inside_z.data(), &s.work);
+  return kernel::count_inside(FloatBody(b, placement.origin), s.inside_x.data(), s.inside_y.data(), s.inside_z.data(), in_a, s.band,
+                              &s.work) > 0;
 }
 
 bool touches(const Body& a, const Body& b, const PointSet& points) {
@@ -185,7 +185,7 @@ void flag_deformed_in(const Box& box, const Vec3& origin, const Body& body, std:
   }
   s.flags.resize(points.size());
   kernel::flag_deformed(FloatBody(body, origin), s.bodies, rule == ContactRule::kMax, s.x.data(), s.y.data(), s.z.data(), points.size(),
-                        s.flags.data());
+                        s.flags.data(), &s.work);
 }
 
 }  // namespace

@@ -3,7 +3,7 @@
 //          in the same order.
 // Why the same bits everywhere: only + - * and conversions, in a fixed order per point; no multiply-add, no contraction
 // (compiler flags), no reduction over points but integer counts. So a point's value does not depend on the width it was computed in.
-// Threads: pure but for the caller's buffers.
+// Threads: pure but for the caller's buffers and CountWork.
 #pragma once
 
 #include <cstddef>
@@ -35,22 +35,29 @@ struct BandBuffer {
   void hold(std::size_t n);
 };
 
-/// How many of n points are inside.
-std::uint32_t count_inside(const FloatBody& body, const float* x, const float* y, const float* z, std::size_t n, BandBuffer& band);
-
-/// The same, and copies the inside points to out_x, out_y, out_z (in no particular order). out may not overlap the input.
-std::uint32_t select_inside(const FloatBody& body, const float* x, const float* y, const float* z, std::size_t n, BandBuffer& band,
-                            float* out_x, float* out_y, float* out_z);
-
+/// What kernels did, for benchmarks; it grows with every call. Counted in points, not in vectors: a vector computes all of its lanes, and
+/// its noise even where one lane alone asks for it, so the machine does somewhat more than these numbers say.
 struct CountWork {
-  std::uint64_t field_count = 0;     // evaluations of one body's field at one point
-  std::uint64_t noise_count = 0;     // of those, with noise
+  std::uint64_t field_count = 0;     // evaluations of one body's field at one point (or cube's centre), wherever they are made
+  std::uint64_t noise_count = 0;     // of those, where the sign needed the noise
+  std::uint64_t lookup_count = 0;    // points that asked the voxels how many neighbours cover them: no field is evaluated for that
+  std::uint64_t cover_count = 0;     // points asked of noise-free covers (free share), an upper bound: the first that holds a point ends it
   CountWork& operator+=(const CountWork& other) {
     field_count += other.field_count;
     noise_count += other.noise_count;
+    lookup_count += other.lookup_count;
+    cover_count += other.cover_count;
     return *this;
   }
 };
+
+/// How many of n points are inside. (Here and below: `work` may be null.)
+std::uint32_t count_inside(const FloatBody& body, const float* x, const float* y, const float* z, std::size_t n, BandBuffer& band,
+                           CountWork* work = nullptr);
+
+/// The same, and copies the inside points to out_x, out_y, out_z (in no particular order). out may not overlap the input.
+std::uint32_t select_inside(const FloatBody& body, const float* x, const float* y, const float* z, std::size_t n, BandBuffer& band,
+                            float* out_x, float* out_y, float* out_z, CountWork* work = nullptr);
 
 /// counts[j] = how many of n points are inside bodies[j]. Fast where neighbouring points of the arrays are neighbours in space.
 void count_each(std::span<const FloatBody> bodies, const float* x, const float* y, const float* z, std::size_t n, std::uint32_t* counts,

@@ -28,7 +28,7 @@ struct Outputs {
 
 template <bool kSelect>
 HWY_INLINE std::uint32_t scan(const FloatBody& b, const float* HWY_RESTRICT x, const float* HWY_RESTRICT y,
-                              const float* HWY_RESTRICT z, std::size_t n, BandBuffer& band, Outputs& out) {
+                              const float* HWY_RESTRICT z, std::size_t n, BandBuffer& band, Outputs& out, CountWork* work) {
   const D d;
   const std::size_t lanes = hn::Lanes(d);
   const V above = constant(b.band);
@@ -70,6 +70,10 @@ HWY_INLINE std::uint32_t scan(const FloatBody& b, const float* HWY_RESTRICT x, c
     compress_store(w, undecided, d, band_w + band_count);
     band_count += compress_store(smooth, undecided, d, band_smooth + band_count);
   }
+  if (work != nullptr) {
+    work->field_count += n;
+    work->noise_count += band_count;
+  }
   for (std::size_t i = 0; i < band_count; i += lanes) {
     const V u = hn::LoadU(d, band_u + i);
     const V v = hn::LoadU(d, band_v + i);
@@ -87,15 +91,16 @@ HWY_INLINE std::uint32_t scan(const FloatBody& b, const float* HWY_RESTRICT x, c
   return static_cast<std::uint32_t>(kSelect ? out.n : count);
 }
 
-std::uint32_t count_kernel(const FloatBody& body, const float* x, const float* y, const float* z, std::size_t n, BandBuffer& band) {
+std::uint32_t count_kernel(const FloatBody& body, const float* x, const float* y, const float* z, std::size_t n, BandBuffer& band,
+                           CountWork* work) {
   Outputs none{nullptr, nullptr, nullptr, 0};
-  return scan<false>(body, x, y, z, n, band, none);
+  return scan<false>(body, x, y, z, n, band, none, work);
 }
 
 std::uint32_t select_kernel(const FloatBody& body, const float* x, const float* y, const float* z, std::size_t n,
-                            BandBuffer& band, float* out_x, float* out_y, float* out_z) {
+                            BandBuffer& band, float* out_x, float* out_y, float* out_z, CountWork* work) {
   Outputs out{out_x, out_y, out_z, 0};
-  return scan<true>(body, x, y, z, n, band, out);
+  return scan<true>(body, x, y, z, n, band, out, work);
 }
 
 // Without copying: where the points of a vector lie close together (tiled_sobol), most vectors need no noise.
@@ -143,15 +148,16 @@ HWY_EXPORT(select_kernel);
 HWY_EXPORT(count_each_kernel);
 HWY_EXPORT(target_kernel);
 
-std::uint32_t count_inside(const FloatBody& body, const float* x, const float* y, const float* z, std::size_t n, BandBuffer& band) {
+std::uint32_t count_inside(const FloatBody& body, const float* x, const float* y, const float* z, std::size_t n, BandBuffer& band,
+                           CountWork* work) {
   band.hold(n);
-  return HWY_DYNAMIC_DISPATCH(count_kernel)(body, x, y, z, n, band);
+  return HWY_DYNAMIC_DISPATCH(count_kernel)(body, x, y, z, n, band, work);
 }
 
 std::uint32_t select_inside(const FloatBody& body, const float* x, const float* y, const float* z, std::size_t n, BandBuffer& band,
-                            float* out_x, float* out_y, float* out_z) {
+                            float* out_x, float* out_y, float* out_z, CountWork* work) {
   band.hold(n);
-  return HWY_DYNAMIC_DISPATCH(select_kernel)(body, x, y, z, n, band, out_x, out_y, out_z);
+  return HWY_DYNAMIC_DISPATCH(select_kernel)(body, x, y, z, n, band, out_x, out_y, out_z, work);
 }
 
 void count_each(std::span<const FloatBody> bodies, const float* x, const float* y, const float* z, std::size_t n, std::uint32_t* counts,

@@ -15,7 +15,8 @@ void pad(std::vector<float>& values, std::size_t n) {
 
 }  // namespace
 
-void select_own_points(const FloatBody& field, float noisy_scale, const PointSet& unit_points, OwnPoints& out) {
+void select_own_points(const FloatBody& field, float noisy_scale, const PointSet& unit_points, OwnPoints& out,
+                       CountWork* work) {
   const std::size_t n = unit_points.size();
   FloatBody unit = field;
   for (int i = 0; i < 9; ++i) unit.m[i] = i % 4 == 0 ? 1.0F : 0.0F;
@@ -28,7 +29,7 @@ void select_own_points(const FloatBody& field, float noisy_scale, const PointSet
     out.w[i] = unit_points.z[i] * width - noisy_scale;
   }
   out.flags.resize(n + kPadding);
-  flag_inside(unit, out.u.data(), out.v.data(), out.w.data(), n, out.flags.data());
+  flag_inside(unit, out.u.data(), out.v.data(), out.w.data(), n, out.flags.data(), work);
   std::uint32_t inside = 0;
   for (std::size_t i = 0; i < n; ++i) {
     if (out.flags[i] == 0) continue;
@@ -68,7 +69,7 @@ PairScore score_pair_reference(const SearchScene& scene, const std::array<Candid
       const auto cube = [&](float p, int axis) {
         return ((p * scene.voxels_per_um + scene.voxel_shift[axis]) + 12582912.0F) - 12582912.0F;
       };
-      score.shared[k] += scene.counts[static_cast<std::size_t>((std::max(0.0F, cube(z, 2)) * scene.voxels_x + cube(y, 1)) * scene.voxels_x + cube(x, 0))];
+      score.shared[k] += scene.counts[static_cast<std::size_t>((cube(z, 2) * scene.voxels_x + cube(y, 1)) * scene.voxels_x + cube(x, 0))];
     }
   }
   return score;

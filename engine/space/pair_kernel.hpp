@@ -73,10 +73,12 @@ PairScore score_pair(const SearchScene& scene, const std::array<CandidateBody, 2
 PairScore score_pair_reference(const SearchScene& scene, const std::array<CandidateBody, 2>& pair);
 
 /// Fills flags[0..n) with 1 where the point is inside `body`, else 0.
-void flag_inside(const FloatBody& body, const float* x, const float* y, const float* z, std::size_t n, std::uint8_t* flags);
+void flag_inside(const FloatBody& body, const float* x, const float* y, const float* z, std::size_t n, std::uint8_t* flags,
+                 CountWork* work = nullptr);
 
 /// The points of `unit_points` (in [0, 1)^3, mapped on the cube of half edge `noisy_scale`) inside a body with this noise, in stages.
 /// `field`: any body with that noise; only its noise is read.
-void select_own_points(const FloatBody& field, float noisy_scale, const PointSet& unit_points, OwnPoints& out);
+void select_own_points(const FloatBody& field, float noisy_scale, const PointSet& unit_points, OwnPoints& out,
+                       CountWork* work = nullptr);
 
 }  // namespace colony::kernel

@@ -16,7 +16,7 @@ struct Tally {
   std::uint32_t hits = 0, covering = 0, sibling = 0;
 };
 
-// Counts at the cubes with these indices (whole numbers below 2^23), summed over the lanes. One load a lane: a gather costs more on the
+// Counts at the cubes with these indices (whole numbers below 2^24), summed over the lanes. One load a lane: a gather costs more on the
 // CPUs we know (Zen).
 HWY_INLINE std::uint32_t look_up(const std::uint8_t* counts, V cubes) {
   const D d;
@@ -61,9 +61,8 @@ HWY_INLINE Tally tally(const SearchScene& scene, const CandidateBody& body, cons
     }
     const V cube_x = cube_of(hn::Add(hn::Mul(x, scale), constant(scene.voxel_shift[0])));
     const V cube_y = cube_of(hn::Add(hn::Mul(y, scale), constant(scene.voxel_shift[1])));
-    // A point on the dish may round to below it; along x and y the box of cubes has room to spare.
-    const V cube_z = hn::Max(hn::Zero(d), cube_of(hn::Add(hn::Mul(z, scale), constant(scene.voxel_shift[2]))));
-    // Exact: all whole numbers below 2^23.
+    const V cube_z = cube_of(hn::Add(hn::Mul(z, scale), constant(scene.voxel_shift[2])));
+    // Exact: all whole numbers below 2^24 (tests/unit/candidate_test.cpp).
     const V cube = hn::Add(hn::Mul(hn::Add(hn::Mul(cube_z, nx), cube_y), nx), cube_x);
     covering += look_up(scene.counts, hn::IfThenElse(above, cube, constant(scene.empty_cube)));
 
@@ -73,7 +72,8 @@ HWY_INLINE Tally tally(const SearchScene& scene, const CandidateBody& body, cons
     const V smooth = smooth_field(su, sv, sw);
     in_sibling += hn::CountTrue(d, hn::And(above, hn::Ge(smooth, hn::Zero(d))));
   }
-  work.field_count += hits;
+  work.field_count += hits;  // the sibling's; points below the dish are asked nothing
+  work.lookup_count += hits;
   return {static_cast<std::uint32_t>(hits), covering, static_cast<std::uint32_t>(in_sibling)};
 }
 
@@ -104,7 +104,7 @@ PairScore score_pair_kernel(const SearchScene& scene, const std::array<Candidate
 
 // Cubes of a body: see voxel_kernel.hpp.
 void raster_kernel(const FloatBody& body, float edge, std::int32_t nx, std::int32_t ny, std::int32_t nz, std::int32_t words_per_row,
-                   std::uint32_t* HWY_RESTRICT rows) {
+                   std::uint32_t* HWY_RESTRICT rows, CountWork& work) {
   const D d;
   const hn::RebindToSigned<D> integers;
   const auto lanes = static_cast<std::int32_t>(hn::Lanes(d));
@@ -123,7 +123,9 @@ void raster_kernel(const FloatBody& body, float edge, std::int32_t nx, std::int3
         const auto near = hn::And(hn::Ge(smooth, constant(-body.band)), hn::FirstN(d, static_cast<std::size_t>(nx - i)));
         if (hn::AllFalse(d, near)) continue;
         auto inside = hn::And(near, hn::Gt(smooth, constant(body.band)));
-        if (!hn::AllFalse(d, hn::AndNot(inside, near))) {
+        const auto undecided = hn::AndNot(inside, near);
+        if (!hn::AllFalse(d, undecided)) {
+          work.noise_count += hn::CountTrue(d, undecided);
           inside = hn::And(near, hn::Ge(hn::Add(smooth, noise(body, u, v, w)), hn::Zero(d)));
         }
         std::uint8_t bytes[8 + 8] = {0};
@@ -134,6 +136,7 @@ void raster_kernel(const FloatBody& body, float edge, std::int32_t nx, std::int3
       }
     }
   }
+  work.field_count += static_cast<std::uint64_t>(nx) * static_cast<std::uint64_t>(ny) * static_cast<std::uint64_t>(nz);
 }
 
 void add_rows_kernel(const RowRange& rows, std::int32_t first_x, std::int32_t n, std::uint8_t* HWY_RESTRICT counts) {
@@ -153,9 +156,9 @@ void add_rows_kernel(const RowRange& rows, std::int32_t first_x, std::int32_t n,
         }
         if (x + 32 > n) bits = x < n ? bits & ((1U << (n - x)) - 1U) : 0;
         if (bits == 0) continue;
-        const std::uint64_t padded = bits;  // LoadMaskBits may read 8 bytes
         for (std::size_t i = 0; i < 32; i += lanes) {
-          const auto mask = hn::LoadMaskBits(bytes, reinterpret_cast<const std::uint8_t*>(&padded) + i / 8);
+          const std::uint64_t part = bits >> i;  // LoadMaskBits may read 8 bytes; lanes may be fewer than a byte's bits
+          const auto mask = hn::LoadMaskBits(bytes, reinterpret_cast<const std::uint8_t*>(&part));
           const auto before = hn::LoadU(bytes, row + x + i);
           hn::StoreU(hn::SaturatedAdd(before, hn::IfThenElseZero(mask, one)), bytes, row + x + i);
         }
@@ -164,7 +167,8 @@ void add_rows_kernel(const RowRange& rows, std::int32_t first_x, std::int32_t n,
   }
 }
 
-void flag_inside_kernel(const FloatBody& body, const float* x, const float* y, const float* z, std::size_t n, std::uint8_t* flags) {
+void flag_inside_kernel(const FloatBody& body, const float* x, const float* y, const float* z, std::size_t n, std::uint8_t* flags,
+                        CountWork& work) {
   const D d;
   const std::size_t lanes = hn::Lanes(d);
   for (std::size_t i = 0; i < n; i += lanes) {
@@ -175,9 +179,11 @@ void flag_inside_kernel(const FloatBody& body, const float* x, const float* y, c
     const V v = row(body.m + 3, body.t[1], px, py, pz);
     const V w = row(body.m + 6, body.t[2], px, py, pz);
     const V smooth = smooth_field(u, v, w);
-    const auto near = hn::Ge(smooth, constant(-body.band));
+    const auto near = hn::And(hn::Ge(smooth, constant(-body.band)), hn::FirstN(d, n - i));
     auto inside = hn::And(near, hn::Gt(smooth, constant(body.band)));
-    if (!hn::AllFalse(d, hn::AndNot(inside, near))) {
+    const auto undecided = hn::AndNot(inside, near);
+    if (!hn::AllFalse(d, undecided)) {
+      work.noise_count += hn::CountTrue(d, undecided);
       inside = hn::And(near, hn::Ge(hn::Add(smooth, noise(body, u, v, w)), hn::Zero(d)));
     }
     std::uint8_t bits[8 + 8];
@@ -185,6 +191,7 @@ void flag_inside_kernel(const FloatBody& body, const float* x, const float* y, c
     const std::size_t count = n - i < lanes ? n - i : lanes;
     for (std::size_t lane = 0; lane < count; ++lane) flags[i + lane] = (bits[lane >> 3] >> (lane & 7)) & 1;
   }
+  work.field_count += n;
 }
 
 }  // namespace colony::kernel::HWY_NAMESPACE
@@ -203,16 +210,19 @@ PairScore score_pair(const SearchScene& scene, const std::array<CandidateBody, 2
 }
 
 void raster_rows(const FloatBody& body, float edge, std::int32_t nx, std::int32_t ny, std::int32_t nz, std::int32_t words_per_row,
-                 std::uint32_t* rows) {
-  HWY_DYNAMIC_DISPATCH(raster_kernel)(body, edge, nx, ny, nz, words_per_row, rows);
+                 std::uint32_t* rows, CountWork* work) {
+  CountWork unused;
+  HWY_DYNAMIC_DISPATCH(raster_kernel)(body, edge, nx, ny, nz, words_per_row, rows, work != nullptr ? *work : unused);
 }
 
 void add_rows(const RowRange& rows, std::int32_t first_x, std::int32_t n, std::uint8_t* counts) {
   HWY_DYNAMIC_DISPATCH(add_rows_kernel)(rows, first_x, n, counts);
 }
 
-void flag_inside(const FloatBody& body, const float* x, const float* y, const float* z, std::size_t n, std::uint8_t* flags) {
-  HWY_DYNAMIC_DISPATCH(flag_inside_kernel)(body, x, y, z, n, flags);
+void flag_inside(const FloatBody& body, const float* x, const float* y, const float* z, std::size_t n, std::uint8_t* flags,
+                 CountWork* work) {
+  CountWork unused;
+  HWY_DYNAMIC_DISPATCH(flag_inside_kernel)(body, x, y, z, n, flags, work != nullptr ? *work : unused);
 }
 
 }  // namespace colony::kernel

@@ -1,5 +1,5 @@
 // voxel_kernel: a body's cubes, a row of them at a time (voxels.hpp).
-// Threads: pure.
+// Threads: pure but for the caller's CountWork.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@ namespace colony::kernel {
 
 /// Sets bit i % 32 of word i / 32 of row (k, j) where the point edge * (i, j, k) lies inside `body`; other bits of the words to 0.
 void raster_rows(const FloatBody& body, float edge, std::int32_t nx, std::int32_t ny, std::int32_t nz, std::int32_t words_per_row,
-                 std::uint32_t* rows);
+                 std::uint32_t* rows, CountWork* work = nullptr);
 
 /// Rows (z, y, word) of a raster, of which those with first_y <= y < end_y count. Eight bytes beyond the last are readable.
 struct RowRange {

@@ -22,7 +22,7 @@ std::int32_t cube_of(double coordinate_um, double edge_um) {
 }
 
 // Where the raster lies, and the body relative to the centre of its first cube.
-kernel::FloatBody frame_raster(const Body& body, double edge_um, Raster& out) {
+kernel::FloatBody frame_raster(const Body& body, double edge_um, VoxelRaster& out) {
   const Box& box = body.box();
   out.x0 = cube_of(box.low.x(), edge_um);
   out.y0 = cube_of(box.low.y(), edge_um);
@@ -39,18 +39,18 @@ constexpr std::size_t kPadding = 64;       // whole vectors are written, and one
 
 }  // namespace
 
-bool Raster::holds(std::int32_t x, std::int32_t y, std::int32_t z) const {
+bool VoxelRaster::holds(std::int32_t x, std::int32_t y, std::int32_t z) const {
   const std::int32_t i = x - x0, j = y - y0, k = z - z0;
   if (i < 0 || j < 0 || k < 0 || i >= nx || j >= ny || k >= nz) return false;
   return (rows[static_cast<std::size_t>((k * ny + j) * words_per_row + i / 32)] >> (i % 32)) & 1U;
 }
 
-void make_raster(const Body& body, double edge_um, Raster& out) {
+void make_raster(const Body& body, double edge_um, VoxelRaster& out, kernel::CountWork* work) {
   const kernel::FloatBody relative = frame_raster(body, edge_um, out);
-  kernel::raster_rows(relative, static_cast<float>(edge_um), out.nx, out.ny, out.nz, out.words_per_row, out.rows.data());
+  kernel::raster_rows(relative, static_cast<float>(edge_um), out.nx, out.ny, out.nz, out.words_per_row, out.rows.data(), work);
 }
 
-void make_raster_reference(const Body& body, double edge_um, Raster& out) {
+void make_raster_reference(const Body& body, double edge_um, VoxelRaster& out) {
   const kernel::FloatBody relative = frame_raster(body, edge_um, out);
   const auto edge = static_cast<float>(edge_um);
   for (std::int32_t k = 0; k < out.nz; ++k) {
@@ -63,7 +63,7 @@ void make_raster_reference(const Body& body, double edge_um, Raster& out) {
   }
 }
 
-const Raster& RasterCache::of(CellId id, const Body& body, std::uint64_t& field_count) {
+const VoxelRaster& RasterCache::of(CellId id, const Body& body, kernel::CountWork& work) {
   while (slots_.size() < kSlotsMax && slots_.size() < id.value) {
     std::vector<Slot> grown(std::max<std::size_t>(64, 2 * slots_.size()));
     for (Slot& slot : slots_) {
@@ -78,8 +78,7 @@ const Raster& RasterCache::of(CellId id, const Body& body, std::uint64_t& field_
     slot.centre = body.centre_um();
     slot.to_unit = body.to_unit();
     slot.noise_offset = body.noise_offset();
-    make_raster(body, edge_um_, slot.raster);
-    field_count += static_cast<std::uint64_t>(slot.raster.nx) * static_cast<std::uint64_t>(slot.raster.ny) * static_cast<std::uint64_t>(slot.raster.nz);
+    make_raster(body, edge_um_, slot.raster, &work);
   }
   return slot.raster;
 }
@@ -103,7 +102,7 @@ void VoxelCounts::centre_on(const Vec3& pivot_um) {
   std::memset(counts_.data(), 0, counts_.size());
 }
 
-void VoxelCounts::add(const Raster& raster) {
+void VoxelCounts::add(const VoxelRaster& raster) {
   const std::int32_t first_y = raster.y0 - y0_;
   CHECK(raster.z0 >= 0 && raster.z0 + raster.nz < nz_);
   const kernel::RowRange rows{raster.rows.data(), raster.words_per_row, raster.ny, raster.nz, std::max(0, -first_y), std::min(raster.ny, n_ - first_y)};

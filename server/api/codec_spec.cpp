@@ -11,8 +11,6 @@ namespace {
 
 constexpr std::array<std::string_view, 6> kSpecNames = {"name", "labels", "seed", "preset", "until", "model"};
 constexpr std::array<std::string_view, 2> kUntilNames = {"time_h", "cells"};
-// Presets of the model that need what this version does not simulate.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 1> kLaterPresets = {{{"tumour", "several layers"}}};
 
 constexpr const char* kSummary = "the job spec is wrong; nothing was stored";
 
@@ -76,12 +74,6 @@ void decode_preset(const Json& json, JobSpec& spec, Errors& errors) {
     spec.preset = name;
     spec.run.params = *params;
     return;
-  }
-  for (const auto& [later, need] : kLaterPresets) {
-    if (name == later) {
-      return errors.push_back(
-          {"/preset", "needs " + std::string(need) + ", which this version does not simulate; use one of " + names});
-    }
   }
   errors.push_back({"/preset", "must be one of " + names + suggestion(name, preset_names())});
 }

@@ -115,6 +115,15 @@ std::vector<std::pair<std::string, RunSpec>> scenes() {
   spec.params.wake.rule = WakeRule::kAlways;
   spec.params.wake.free_radius_um = 45.0;  // longer than the reach: waking bounds what is read and written
   all.emplace_back("wide free radius", spec);
+  // Several layers: reach and free share are balls inside the same squares.
+  all.emplace_back("layers", testing::spec_of(1, testing::scaled(120, 300), *preset("tumour")));
+  spec = testing::spec_of(2, 100'000, *preset("tumour"));
+  spec.params.founders.count = 40;
+  spec.params.founders.radius_um = 110.0;
+  spec.params.dish.radius_um = 140.0;
+  spec.params.wake.rule = WakeRule::kAlways;
+  spec.until = {std::nullopt, testing::scaled(18.0, 40.0)};
+  all.emplace_back("layers, packed, wake always", spec);
   return all;
 }
 

@@ -3,16 +3,14 @@
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
-#include <hwy/targets.h>
 #include <map>
-#include <set>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include "engine/space/overlap_kernel.hpp"
 #include "tests/support/runs.hpp"
+#include "tests/support/targets.hpp"
 
 namespace colony {
 namespace {
@@ -62,6 +60,17 @@ std::map<std::string, RunSpec> scenes() {
   spec.params.dish.radius_um = 60.0;
   spec.until = {std::nullopt, 60.0};
   all["many-moves-8-founders-dish-60-h"] = spec;
+
+  all["tumour-seed-1-to-150-cells"] = testing::spec_of(1, 150, *preset("tumour"));
+
+  spec = testing::spec_of(8, 100'000, *preset("tumour"));
+  spec.params.founders.count = 6;
+  spec.params.founders.radius_um = 40.0;
+  spec.params.dish.radius_um = 55.0;
+  spec.params.contact.neighbour_retained_min = 0.2;
+  spec.params.wake.rule = WakeRule::kAlways;
+  spec.until = {std::nullopt, 36.0};
+  all["tumour-6-founders-dish-retained-always-36-h"] = spec;
   return all;
 }
 
@@ -122,23 +131,25 @@ TEST(Digests, DoNotDependOnTheWindowWithMovesEither) {
   }
 }
 
-TEST(Digests, DoNotDependOnTheVectorWidth) {
-  const RunSpec spec = testing::spec_of(9, 30);
-  const std::string expected = digest_of(spec);
-  std::set<std::string> names;  // several bits may fall back to one target
-  for (std::int64_t bit = 1; bit > 0 && bit <= hwy::SupportedTargets(); bit <<= 1) {
-    if ((hwy::SupportedTargets() & bit) == 0) continue;
-    hwy::SetSupportedTargetsForTest(bit);
-    hwy::GetChosenTarget().DeInit();
-    const std::string name = kernel::vector_target();
-    if (names.insert(name).second) {
-      EXPECT_EQ(digest_of(spec), expected) << name;
-    }
-    hwy::SetSupportedTargetsForTest(0);
-    hwy::GetChosenTarget().DeInit();
+TEST(Digests, DoNotDependOnTheWindowWithLayersEither) {
+  std::string expected;
+  for (const double window_h : {1.0, 0.01, 0.25, 2.0}) {
+    RunSpec spec = testing::spec_of(8, 80, *preset("tumour"));
+    spec.params.window_h = window_h;
+    ASSERT_TRUE(validate(spec.params).empty());
+    const std::string found = digest_of(spec);
+    if (expected.empty()) expected = found;
+    EXPECT_EQ(found, expected) << testing::name_of_run(spec) << " window " << window_h;
   }
-  for (const std::string& name : names) std::printf("compared %s\n", name.c_str());
-  EXPECT_GE(names.size(), 2U);
+}
+
+TEST(Digests, DoNotDependOnTheVectorWidth) {
+  const std::vector<RunSpec> specs = {testing::spec_of(9, 30), testing::spec_of(9, 60, *preset("tumour"))};
+  std::vector<std::string> expected;
+  for (const RunSpec& spec : specs) expected.push_back(digest_of(spec));
+  testing::on_every_target([&](const std::string& name) {
+    for (std::size_t i = 0; i < specs.size(); ++i) EXPECT_EQ(digest_of(specs[i]), expected[i]) << name << ", scene " << i;
+  });
 }
 
 TEST(Digests, DifferBySeed) {

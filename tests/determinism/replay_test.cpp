@@ -44,6 +44,7 @@ std::vector<Scene> scenes() {
   crowded.wake.rule = WakeRule::kAlways;
   crowded.dish.radius_um = 25.0;
   all.back().spec.until = {std::nullopt, testing::scaled(90.0, 200.0)};
+  all.push_back({"layers", testing::spec_of(7, testing::scaled(50, 200), *preset("tumour"))});
   return all;
 }
 

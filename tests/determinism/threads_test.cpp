@@ -61,6 +61,9 @@ std::vector<Scene> scenes() {
   all.push_back({"retained, max", founders(5, 12, 60.0, testing::scaled(14.0, 30.0))});
   all.back().spec.params.contact.rule = ContactRule::kMax;
   all.back().spec.params.contact.neighbour_retained_min = 0.3;
+  all.push_back({"layers", testing::spec_of(6, testing::scaled(80, 300), *preset("tumour"))});
+  all.push_back({"layers, packed, with a wall", packed()});
+  all.back().spec.params.layers = Layers::kMulti;
   return all;
 }
 

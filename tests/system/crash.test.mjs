@@ -10,7 +10,8 @@ import { Stream } from './harness/stream.mjs';
 import { seeded, within } from './harness/wait.mjs';
 
 const killCount = full ? 50 : 10;
-const spec = { name: 'killed', seed: 41, preset: 'paper', until: { cells: full ? 600 : 200 } };
+// Many points a search: it takes milliseconds, so that a kill can come between two events.
+const spec = { name: 'killed', seed: 41, preset: 'paper', until: { cells: full ? 600 : 200 }, model: { search: { points: 4096 } } };
 
 /** Every row of a table of the only job of DATA, as the sqlite3 shell reads it beside the running server. */
 function rows(data, table) {

@@ -72,7 +72,7 @@ TEST(Spec, OneFaultIsNamedByItsPointer) {
       {R"({"until": {"cells": 1}, "seed": 9007199254740992})", "/seed"},
       {R"({"until": {"cells": 1}, "seed": 99999999999999999999})", "/seed"},
       {R"({"until": {"cells": 1}, "preset": "made-up"})", "/preset"},
-      {R"({"until": {"cells": 1}, "preset": "tumour"})", "/preset"},
+      {R"({"until": {"cells": 1}, "preset": "tumor"})", "/preset"},
       {R"({"until": {"cells": 1}, "preset": "young-colonies"})", "/preset"},
       {R"({"until": {"cells": 1}, "preset": null})", "/preset"},
       {R"({"until": {"cells": 1}, "name": 7})", "/name"},
@@ -103,7 +103,8 @@ TEST(Spec, OneFaultIsNamedByItsPointer) {
       {with_model(R"({"noise": {"amplitude": 0.46}})"), "/model/noise/amplitude"},
       {with_model(R"({"noise": {"amplitude": 0.42, "frequency": 6}})"), "/model/noise/amplitude"},
       {with_model(R"({"noise": {"frequency": 1.9}})"), "/model/noise/frequency"},
-      {with_model(R"({"layers": "multi"})"), "/model/layers"},
+      {with_model(R"({"layers": "two"})"), "/model/layers"},
+      {with_model(R"({"layers": "multi", "motility": {"rate_per_h": 0.1}})"), "/model/motility/rate_per_h"},
       {with_model(R"({"motility": {"rate_per_h": 2.1}})"), "/model/motility/rate_per_h"},
       {with_model(R"({"motility": {"rate_per_h": 1e-9}})"), "/model/motility/rate_per_h"},
       {with_model(R"({"motility": {"rate_per_h": 1}})"), "/model/window_h"},
@@ -247,6 +248,9 @@ TEST(EstimateOfAJob, StaysWithinItsBoundsAndNamesItsBasis) {
   EXPECT_GT(of(R"({"until": {"cells": 100}, "preset": "young-colony"})").stored_bytes,
             of(R"({"until": {"cells": 100}})").stored_bytes)
       << "moves are stored";
+  const Estimate tumour = of(R"({"until": {"time_h": 726}, "preset": "tumour"})");
+  EXPECT_NEAR(static_cast<double>(tumour.cells), 5000.0, 1500.0) << "as grown: 5,000 cells at 726 h";
+  EXPECT_NE(tumour.basis.find("tumour"), std::string_view::npos);
 }
 
 }  // namespace

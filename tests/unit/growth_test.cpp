@@ -9,6 +9,7 @@
 
 #include "engine/growth/chromosome.hpp"
 #include "engine/growth/splitting.hpp"
+#include "tests/support/any_params.hpp"
 #include "tests/support/bodies.hpp"
 #include "tests/support/scale.hpp"
 #include "tests/support/stats.hpp"
@@ -35,7 +36,7 @@ TEST(SplittingPlane, AngleErrorAgainstTheShortAxisFallsWithElongation) {
       g.centre_um = Vec3(3.0, -2.0, spread_height_um(g.semiaxes_um));
       const Body body(g, testing::smooth());
       const Vec3 c = centroid_above_dish_um(g);
-      const auto m = nearest_membrane_um(body, {}, ContactRule::kSum, c, testing::points(kMembranePoints, k));
+      const auto m = nearest_membrane_um(body, {}, ContactRule::kSum, c, testing::points(kSettlePoints, k));
       ASSERT_TRUE(m);
       ASSERT_FALSE(body.contains(*m));
       ASSERT_GE(m->z(), 0.0);
@@ -99,28 +100,29 @@ RC_GTEST_PROP(GrayCode, RoundTripsAndNeighboursDifferInOneBit, (std::uint16_t ra
 TEST(Chromosome, GenesCoverTheirIntervalAndCodesRoundTrip) {
   for (const Coding coding : {Coding::kGray, Coding::kBinary}) {
     for (int bits = 4; bits <= 16; ++bits) {
-      Chromosome chromosome(bits);
-      for (int gene = 0; gene < kGeneCount; ++gene) {
+      Chromosome chromosome(kGeneCountMulti, bits);
+      for (int gene = 0; gene < kGeneCountMulti; ++gene) {
         for (const double value : {0.0, 0.25, 0.5, 1.0}) {
           chromosome.set_code(gene, code_of(value, bits, coding));
           EXPECT_NEAR(chromosome.value(gene, coding), value, 0.5001 / ((1 << bits) - 1));
         }
       }
-      EXPECT_EQ(chromosome.length(), 17 * bits);
+      EXPECT_EQ(chromosome.length(), 19 * bits);
+      EXPECT_EQ(Chromosome(kGeneCountMono, bits).length(), 17 * bits);
     }
   }
 }
 
 TEST(Chromosome, FlipChangesOneBitCountedFromTheMostSignificantOfTheFirstGene) {
   for (const int bits : {4, 8, 16}) {
-    for (int bit = 0; bit < kGeneCount * bits; ++bit) {
-      Chromosome chromosome(bits);
+    for (int bit = 0; bit < kGeneCountMulti * bits; ++bit) {
+      Chromosome chromosome(kGeneCountMulti, bits);
       chromosome.flip(bit);
-      for (int gene = 0; gene < kGeneCount; ++gene) {
+      for (int gene = 0; gene < kGeneCountMulti; ++gene) {
         EXPECT_EQ(chromosome.code(gene), gene == bit / bits ? 1U << (bits - 1 - bit % bits) : 0U);
       }
       chromosome.flip(bit);
-      EXPECT_EQ(chromosome, Chromosome(bits));
+      EXPECT_EQ(chromosome, Chromosome(kGeneCountMulti, bits));
     }
   }
 }
@@ -128,7 +130,7 @@ TEST(Chromosome, FlipChangesOneBitCountedFromTheMostSignificantOfTheFirstGene) {
 TEST(Chromosome, CrossoverTakesTheHeadOfOneAndTheTailOfTheOther) {
   Stream stream = testing::case_stream(1);
   for (const int bits : {4, 7, 8, 16}) {
-    const Chromosome a = random_chromosome(bits, stream), b = random_chromosome(bits, stream);
+    const Chromosome a = random_chromosome(kGeneCountMulti, bits, stream), b = random_chromosome(kGeneCountMulti, bits, stream);
     const auto bit_of = [&](const Chromosome& c, int bit) {
       return (c.code(bit / bits) >> (bits - 1 - bit % bits)) & 1U;
     };
@@ -140,31 +142,6 @@ TEST(Chromosome, CrossoverTakesTheHeadOfOneAndTheTailOfTheOther) {
   }
 }
 
-// Parameters within the ranges of validation, extremes among them.
-Params any_params(Stream& stream) {
-  const auto pick = [&](double low, double high) {
-    const std::uint32_t which = stream.below(4);
-    return which == 0 ? low : which == 1 ? high : stream.uniform({low, high});
-  };
-  const auto interval = [&](double low, double high) {
-    const double a = pick(low, high), b = pick(low, high);
-    return Interval{std::min(a, b), std::max(a, b)};
-  };
-  Params p;
-  p.cell.pair_volume_um3 = interval(50, 100'000);
-  p.cell.smaller_share = interval(0.2, 0.5);
-  p.cell.elongation = interval(1, 3);
-  p.cell.flatness = interval(0.2, 1);
-  p.noise = {pick(0, 0.40), pick(2, 8), pick(0, 6.28)};
-  p.search.coding = stream.below(2) == 0 ? Coding::kGray : Coding::kBinary;
-  p.search.bits = 4 + stream.below(13);
-  p.search.turn_max_deg = pick(0, 90);
-  p.search.distance = interval(0.3, 1.5);
-  p.search.sideways = pick(0, 0.5);
-  p.search.tilt_max_deg = pick(0, 20);
-  return p;
-}
-
 bool within(const Interval& range, double value) {
   const double slack = 1e-9 * std::max(1.0, std::abs(range.high));
   return value >= range.low - slack && value <= range.high + slack;
@@ -172,15 +149,11 @@ bool within(const Interval& range, double value) {
 
 RC_GTEST_PROP(Decode, EveryStringIsAPairInsideAllRangesAndInsideTheSearchReach, (std::uint32_t number)) {
   Stream stream = testing::case_stream(number);
-  const Params p = any_params(stream);
+  const Params p = testing::any_params(stream);
   for (const FieldError& error : validate(p)) RC_ASSERT(error.pointer == "/cell/nucleus_radius_um");  // of no meaning here
   const double reach = search_reach_um(p), extent = body_half_extent_max_um(p);
   for (int i = 0; i < 20; ++i) {
-    Chromosome chromosome = random_chromosome(static_cast<int>(p.search.bits), stream);
-    for (int gene = 0; gene < kGeneCount; ++gene) {  // many genes at an end of their range
-      const std::uint32_t which = stream.below(4);
-      if (which < 2) chromosome.set_code(gene, code_of(which, chromosome.bits(), p.search.coding));
-    }
+    const Chromosome chromosome = testing::any_chromosome(p, stream);
     PairFrame frame;
     frame.pivot_um = Vec3(stream.uniform({-100, 100}), stream.uniform({-100, 100}), 3.0);
     const double angle = stream.uniform({0, 6.28});
@@ -226,7 +199,7 @@ TEST(Decode, TheUnturnedCandidateStandsAcrossTheGivenPlane) {
   for (const Coding coding : {Coding::kGray, Coding::kBinary}) {
     p.search.coding = coding;
     Stream stream = testing::case_stream(5);
-    Chromosome chromosome = random_chromosome(8, stream);
+    Chromosome chromosome = random_chromosome(kGeneCountMono, 8, stream);
     chromosome.set_code(kTurn, code_of(0.5, 8, coding));
     PairFrame frame;
     frame.direction = Vec3(0.6, 0.8, 0.0);

@@ -32,6 +32,7 @@ inline Result<RunSpec> decode(const std::string& text) {
     return Error{ErrorCode::kInvalid, "not a spec"};
   spec.seed = seed;
   spec.until.cells = cells;
+  spec.params.search.points = 16'384;  // some milliseconds a search: a test can come between
   if (founders > 1) {
     spec.params.founders.count = founders;
     spec.params.founders.radius_um = 10'000.0;

@@ -136,7 +136,7 @@ TEST(MoveDirection, TheDishWallCountsAsCovered) {
 TEST(Move, ShiftsTheBodyRigidlyAndKeepsAllElse) {
   const Params params = testing::crawling();
   std::vector<Cell> cells = testing::scattered_cells(1, 10.0, 5);
-  cells[0].nearest_membrane_um = cells[0].centre_um + Vec3(4.0, -1.0, 0.2);
+  cells[0].nearest_membrane_um = Vec3(cells[0].centre_um + Vec3(4.0, -1.0, 0.2));
   cells[0].deformed_volume_um3 = 300.0;
   cells[0].due_h = 12.5;
   cells[0].ordinal = 7;

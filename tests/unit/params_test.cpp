@@ -230,8 +230,12 @@ TEST(Validate, RulesBetweenParametersHoldAtTheirEdge) {
          p.window_h = 1.01;
        },
        [](Params& p) { p.motility.rate_per_h = 0.1; }},
-      {"one layer yet", "/layers", [](Params& p) { p.layers = Layers::kMulti; },
-       [](Params& p) { p.layers = Layers::kMono; }},
+      {"no moves where there are layers", "/motility/rate_per_h",
+       [](Params& p) {
+         p.layers = Layers::kMulti;
+         p.motility.rate_per_h = 0.1;
+       },
+       [](Params& p) { p.layers = Layers::kMulti; }},
   };
   for (const CrossRule& rule : rules) {
     Params params;

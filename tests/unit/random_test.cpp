@@ -3,6 +3,7 @@
 #include <bit>
 #include <map>
 #include <set>
+#include <span>
 #include <vector>
 
 #include <boost/random/sobol.hpp>
@@ -11,9 +12,11 @@
 
 #include "engine/base/check.hpp"
 #include "engine/random/sobol.hpp"
+#include "engine/random/sobol_kernel.hpp"
 #include "engine/random/stream.hpp"
 #include "tests/support/scale.hpp"
 #include "tests/support/stats.hpp"
+#include "tests/support/targets.hpp"
 
 namespace colony {
 namespace {
@@ -31,7 +34,7 @@ TEST(Philox, GivesRandom123sKnownAnswers) {
 TEST(Stream, CounterWordsAreCellOrdinalPurposeWithLaneAndBlock) {
   const Seed seed = 0x0012345689abcdefULL;
   Stream stream(seed, CellId{77}, 5, Purpose::kSearch, 0xabcdef);
-  for (std::uint32_t block = 0; block < 3; ++block) {
+  for (std::uint32_t block = 0; block < 14; ++block) {  // blocks are made one, then four at a time
     const Words4 words = philox4x32_10({77, 5, (7U << 24) | 0xabcdefU, block}, {0x89abcdef, 0x00123456});
     for (const std::uint32_t word : words) EXPECT_EQ(stream.next_u32(), word);
   }
@@ -161,9 +164,10 @@ TEST(OwenScrambling, DiffersBySeedAndFillsTheInterval) {
   EXPECT_LT(testing::chi_square_uniform(counts), testing::chi_square_bound(15));
 }
 
-std::vector<std::uint32_t> column(const std::vector<float>& values) {
+// The first n: point sets are padded.
+std::vector<std::uint32_t> column(const std::vector<float>& values, std::size_t n) {
   std::vector<std::uint32_t> bits;
-  for (const float v : values) bits.push_back(static_cast<std::uint32_t>(v * 16777216.0F) << 8);
+  for (const float v : std::span(values).first(n)) bits.push_back(static_cast<std::uint32_t>(v * 16777216.0F) << 8);
   return bits;
 }
 
@@ -191,8 +195,8 @@ TEST(ScrambledSobol, EverySetIsANetInEachCoordinateAndStratifiedInPairsLikeTheUn
       PointSet points;
       Stream stream(14, CellId{set + 1}, 0, Purpose::kSearchPoints);
       scrambled_sobol(n, {stream.next_u32(), stream.next_u32(), stream.next_u32()}, points);
-      const std::array<std::vector<std::uint32_t>, 3> scrambled = {column(points.x), column(points.y),
-                                                                   column(points.z)};
+      const std::array<std::vector<std::uint32_t>, 3> scrambled = {column(points.x, n), column(points.y, n),
+                                                                   column(points.z, n)};
       for (std::size_t d = 0; d < 3; ++d) {
         std::set<std::uint32_t> intervals;
         for (const std::uint32_t bits : scrambled[d]) intervals.insert(bits >> (32 - m));
@@ -218,6 +222,59 @@ TEST(ScrambledSobol, IsOwenScramblingOfTheSequenceCutTo24Bits) {
     EXPECT_EQ(points.x[i], static_cast<float>(owen_scramble(sobol_u32(i, 0), 5) >> 8) * 0x1.0p-24F);
     EXPECT_EQ(points.y[i], static_cast<float>(owen_scramble(sobol_u32(i, 1), 6) >> 8) * 0x1.0p-24F);
     EXPECT_EQ(points.z[i], static_cast<float>(owen_scramble(sobol_u32(i, 2), 7) >> 8) * 0x1.0p-24F);
+  }
+}
+
+TEST(TiledSobol, IsTheSameSetInRunsOfOneElementaryInterval) {
+  using Point = std::array<float, 3>;
+  for (int m = 0; m <= 12; ++m) {
+    const std::uint32_t n = 1U << m;
+    for (std::uint32_t set = 1; set <= 4; ++set) {
+      PointSet plain, tiled;
+      scrambled_sobol(n, {set, set + 7, 99 * set}, plain);
+      tiled_sobol(n, {set, set + 7, 99 * set}, tiled);
+      std::vector<Point> a, b;
+      for (std::size_t i = 0; i < n; ++i) a.push_back({plain.x[i], plain.y[i], plain.z[i]});
+      for (std::size_t i = 0; i < n; ++i) b.push_back({tiled.x[i], tiled.y[i], tiled.z[i]});
+      // 2^(m-4) tiles of 16 points: half of their bits, rounded up, along x, the others along y.
+      const int tile_bits = std::max(m - 4, 0);
+      const float columns = static_cast<float>(1U << ((tile_bits + 1) / 2)), rows = static_cast<float>(1U << (tile_bits / 2));
+      std::set<std::pair<int, int>> tiles;
+      for (std::size_t first = 0; first < n; first += 16) {
+        const auto tile_of = [&](const Point& p) { return std::pair{static_cast<int>(p[0] * columns), static_cast<int>(p[1] * rows)}; };
+        tiles.insert(tile_of(b[first]));
+        for (std::size_t i = first; i < std::min<std::size_t>(n, first + 16); ++i) ASSERT_EQ(tile_of(b[i]), tile_of(b[first])) << n << " point " << i;
+      }
+      EXPECT_EQ(tiles.size(), std::size_t{1} << tile_bits);
+      std::sort(a.begin(), a.end());
+      std::sort(b.begin(), b.end());
+      ASSERT_EQ(a, b) << n;
+    }
+  }
+  PointSet out;
+  EXPECT_THROW(tiled_sobol(48, {1, 2, 3}, out), CheckFailure);
+}
+
+std::uint32_t reversed(std::uint32_t x) {
+  std::uint32_t y = 0;
+  for (int bit = 0; bit < 32; ++bit) y |= ((x >> bit) & 1U) << (31 - bit);
+  return y;
+}
+
+TEST(ScrambleColumn, IsOwenScramblingOnEveryTarget) {
+  Stream stream(15, CellId{1}, 0, Purpose::kSearchPoints);
+  for (const std::size_t n : {1U, 5U, 16U, 100U, 1000U}) {
+    std::vector<std::uint32_t> words(n + kScramblePadding, 0);
+    for (std::size_t i = 0; i < n; ++i) words[i] = stream.next_u32();
+    const std::uint32_t seed = stream.next_u32();
+    testing::on_every_target([&](const std::string& name) {
+      std::vector<float> found(n + kScramblePadding);
+      scramble_column(words.data(), n, seed, found.data());
+      for (std::size_t i = 0; i < n; ++i) {
+        const float expected = static_cast<float>(owen_scramble(reversed(words[i]), seed) >> 8) * 0x1.0p-24F;
+        ASSERT_EQ(found[i], expected) << name << " word " << i;
+      }
+    }, n == 1000);
   }
 }
 

@@ -40,7 +40,8 @@ void check_woken(const RunSpec& spec, const Colony& before, const Colony& after,
     const auto distance = [&](const Box& box) {
       const double dx = std::max({box.low.x() - cell.centre_um.x(), 0.0, cell.centre_um.x() - box.high.x()});
       const double dy = std::max({box.low.y() - cell.centre_um.y(), 0.0, cell.centre_um.y() - box.high.y()});
-      return std::sqrt(dx * dx + dy * dy);
+      const double dz = std::max({box.low.z() - cell.centre_um.z(), 0.0, cell.centre_um.z() - box.high.z()});
+      return std::sqrt(dx * dx + dy * dy + (spec.params.layers == Layers::kMulti ? dz * dz : 0.0));
     };
     const Cell& daughter = event.kind() == EventKind::kDivided ? after.cells().back() : after.cell(*event.cell_id);
     const bool near = std::min({distance(before.body(*event.cell_id).box()), distance(after.body(*event.cell_id).box()),
@@ -59,10 +60,12 @@ void check_woken(const RunSpec& spec, const Colony& before, const Colony& after,
   }
 }
 
+// Every sleeper near any changed body is asked here; the engine skips those near which nothing went, and must wake the same ones.
 TEST(Waking, WakesExactlyTheSleepersNearAChangeThatGainedRoom) {
-  for (const WakeRule rule : {WakeRule::kShare, WakeRule::kAlways}) {
-    RunSpec spec = testing::spec_of(4, testing::scaled(70, 200));
+  for (const auto& [rule, gain] : {std::pair{WakeRule::kShare, 0.02}, {WakeRule::kShare, 0.002}, {WakeRule::kAlways, 0.02}}) {
+    RunSpec spec = testing::spec_of(4, testing::scaled(400, 1000));
     spec.params.wake.rule = rule;
+    spec.params.wake.gain = gain;
     const testing::Run run = testing::run(spec);
     Colony before(spec.params), after(spec.params);
     int woken = 0;
@@ -71,7 +74,26 @@ TEST(Waking, WakesExactlyTheSleepersNearAChangeThatGainedRoom) {
       check_woken(spec, before, after, event, woken);
       before.apply(event);
     }
-    std::printf("%s: %d woken\n", rule == WakeRule::kShare ? "share" : "always", woken);
+    std::printf("%s, gain %.3f: %d woken\n", rule == WakeRule::kShare ? "share" : "always", gain, woken);
+    EXPECT_GT(woken, rule == WakeRule::kShare ? 3 : 100);
+  }
+}
+
+TEST(Waking, WithLayersTheDistanceIsOneInSpace) {
+  for (const WakeRule rule : {WakeRule::kShare, WakeRule::kAlways}) {
+    RunSpec spec = testing::spec_of(4, testing::scaled(120, 300), *preset("tumour"));
+    spec.params.wake.rule = rule;
+    spec.params.wake.free_radius_um = 10.0;  // short of the top layer from the dish
+    spec.params.wake.free_min = 0.5;
+    const testing::Run run = testing::run(spec);
+    Colony before(spec.params), after(spec.params);
+    int woken = 0;
+    for (const Event& event : run.events) {
+      after.apply(event);
+      check_woken(spec, before, after, event, woken);
+      before.apply(event);
+    }
+    std::printf("layers, %s: %d woken\n", rule == WakeRule::kShare ? "share" : "always", woken);
     EXPECT_GT(woken, rule == WakeRule::kShare ? 3 : 100);
   }
 }
@@ -119,7 +141,7 @@ TEST(Waking, AMoveWakesAsADivisionDoesAndTheMoverItself) {
 
 TEST(Waking, AlwaysCostsManyMoreSearchesThanShare) {
   const auto searches_per_division = [](WakeRule rule) {
-    RunSpec spec = testing::spec_of(6, 80);
+    RunSpec spec = testing::spec_of(6, 160);
     spec.params.wake.rule = rule;
     const testing::Run run = testing::run(spec);
     double searches = 0.0, divisions = 0.0;
@@ -130,7 +152,7 @@ TEST(Waking, AlwaysCostsManyMoreSearchesThanShare) {
     return searches / divisions;
   };
   const double share = searches_per_division(WakeRule::kShare), always = searches_per_division(WakeRule::kAlways);
-  std::printf("searches per division at 80 cells: share %.2f, always %.2f\n", share, always);
+  std::printf("searches per division at 160 cells: share %.2f, always %.2f\n", share, always);
   EXPECT_LT(share, 5.0);
   EXPECT_GT(always, 2.0 * share);
 }

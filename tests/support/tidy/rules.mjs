@@ -150,12 +150,14 @@ export const rules = [
       const found = [];
       if (!new RegExp(`^// ${stem}: \\S`).test(lines[0])) found.push({ line: 1, message: `the first line is not "// ${stem}: what it promises"` });
       const first = lines.findIndex((line) => line.trim() !== '' && !line.startsWith('//'));
-      if (lines[first] !== '#pragma once') found.push({ line: first + 1, message: '#pragma once comes first after the opening comment' });
+      // A header that is read once for each vector target has that guard instead.
+      const perTarget = /^#if defined\(\w+\) == defined\(HWY_TARGET_TOGGLE\)$/.test(lines[first] ?? '');
+      if (!perTarget && lines[first] !== '#pragma once') found.push({ line: first + 1, message: '#pragma once comes first after the opening comment' });
       return found;
     },
     bad: [['engine/base/a.hpp', '#pragma once\n'], ['engine/base/a.hpp', '// a: text\n#include <vector>\n#pragma once\n'],
-      ['engine/base/a.hpp', '// some text\n#pragma once\n']],
-    good: [['engine/base/a.hpp', '// a: text.\n// More.\n\n#pragma once\n']],
+      ['engine/base/a.hpp', '// some text\n#pragma once\n'], ['engine/base/a.hpp', '// a: text.\n#if defined(A) == defined(B)\n']],
+    good: [['engine/base/a.hpp', '// a: text.\n// More.\n\n#pragma once\n'], ['engine/space/a.hpp', '// a: text.\n#if defined(A_HPP) == defined(HWY_TARGET_TOGGLE)\n']],
   },
   {
     name: 'white-space', text: 'no tabs, trailing blanks or carriage returns; the last line ends', files: (path) => text(path) && !/\.csv$|^tests\/bench\/results\//.test(path),
