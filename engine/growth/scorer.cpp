@@ -90,11 +90,12 @@ Scorer::Scorer(const Colony& colony, const Params& params, const SearchTask& tas
 
 void Scorer::race_to(double best) {
   const std::size_t n = std::max(ws_.scene.own[0].size(), ws_.scene.own[1].size());
+  for (std::size_t h = ws_.roots.size(); h <= n; ++h) ws_.roots.push_back(std::sqrt(static_cast<double>(h)));
   ws_.most_shared.resize(n + 1);
+  const double share = 1.0 - best;
+  const double deviation = kDropDeviations * std::sqrt(best * (1.0 - best));
   for (std::size_t h = 0; h <= n; ++h) {
-    const auto hits = static_cast<double>(h);
-    ws_.most_shared[h] =
-        static_cast<std::uint32_t>(hits * (1.0 - best) + kDropDeviations * std::sqrt(hits * best * (1.0 - best)) + 0.5);
+    ws_.most_shared[h] = static_cast<std::uint32_t>(static_cast<double>(h) * share + deviation * ws_.roots[h] + 0.5);
   }
   racing_ = best > 0.0;
 }

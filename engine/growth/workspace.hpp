@@ -59,6 +59,7 @@ struct Workspace {
   std::array<kernel::CandidateBody, 2> candidate;
   std::vector<kernel::CountWork> work_of;             // a candidate, where threads score them
   std::vector<std::uint32_t> most_shared;
+  std::vector<double> roots;                          // sqrt(0), sqrt(1), ...: what race_to needs again and again
   struct Neighbour {
     float gap_um = 0.0F;                // no candidate of less reach can meet it
     CellId id;

@@ -11,7 +11,7 @@
 namespace colony {
 namespace {
 
-constexpr double kVoxelsMax = 8e6;         // in the box of a search
+constexpr double kVoxelsMax = 7e6;         // in the box of a search
 constexpr double kEdgesAcrossSmallest = 8.0;
 
 std::int32_t cube_of(double coordinate_um, double edge_um) {

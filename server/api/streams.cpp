@@ -162,14 +162,16 @@ http::BodySource::Pull EventStream::pull(std::string& out) {
   // Deleted while it was watched, or the storage failed: without `event: end` the reader reconnects and is told.
   if (!view) return Pull::kEnd;
   if (wish_.events) {
-    if (next_ == page_.size()) {
+    const bool is_fresh = next_ == page_.size();
+    if (is_fresh) {
       auto events = jobs_.events(id_, wish_.filter, kEventsPerRead);
       if (!events) return Pull::kEnd;
       page_ = std::move(*events);
       next_ = 0;
     }
-    // A page that is not full is all there was. Nothing more need be asked after it: what comes later wakes.
-    const bool is_last_page = page_.size() < kEventsPerRead;
+    // A page that is not full is all there was when it was read. If that was now, after the state, nothing more need be asked: what comes
+    // later wakes. If it was in an earlier pull, whose piece was full, the job may have gone on and even ended since.
+    const bool is_last_page = is_fresh && page_.size() < kEventsPerRead;
     for (; next_ < page_.size() && out.size() < kPieceBytes; ++next_) {
       append_event_message(out, page_[next_]);
       wish_.filter.after = page_[next_].seq;

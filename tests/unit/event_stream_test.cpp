@@ -187,6 +187,32 @@ TEST_F(LiveStream, APieceIsOfItsSizeHoweverManyEventsWait) {
   EXPECT_EQ(seq, 1000u);
 }
 
+// The rest of a page is sent in a later pull, when more may be stored and the job ended: "terminal, and nothing left" is true only of a
+// page that was read after the state.
+TEST_F(LiveStream, WhatIsStoredWhileThePieceBeforeWasSentIsNotLostAtTheEnd) {
+  const Event sample = jobs.history.front();
+  jobs.history.assign(1000, sample);
+  for (std::size_t i = 0; i < jobs.history.size(); ++i) jobs.history[i].seq = i + 1;
+  for (const std::size_t before : {300U, 600U, 999U}) {
+    jobs.stored = before;
+    jobs.row.state = JobState::kRunning;
+    open();
+    std::string out;
+    ASSERT_EQ(stream->pull(out), http::BodySource::Pull::kMore) << "the piece is full";
+    jobs.stored = jobs.history.size();
+    jobs.row.state = JobState::kCancelled;
+    jobs.row.reason = "cancelled";
+    out += pull_until(http::BodySource::Pull::kEnd);
+    std::uint64_t seq = 0;
+    for (const std::string& message : split_lines(out, "\n\n")) {
+      if (message.find("\ndata: ") == std::string::npos || message.find("\nid: ") == std::string::npos) continue;
+      if (message.starts_with("event: end") || message.starts_with("id: ")) continue;
+      EXPECT_THAT(message, HasSubstr("\nid: " + std::to_string(++seq) + "\n"));
+    }
+    EXPECT_EQ(seq, 1000U) << before;
+  }
+}
+
 TEST_F(LiveStream, AJobDeletedUnderItEndsItWithoutEnd) {
   open();
   pull_until(http::BodySource::Pull::kWait);
