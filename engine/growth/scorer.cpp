@@ -202,7 +202,9 @@ Footing Scorer::footing(const kernel::PairScore& score, const std::array<kernel:
 }
 
 void Scorer::cover(float reach_um) {
-  // The margin is for rounding alone.
+  // A cube may be covered whose far half lies beyond the body: an edge more, so that what a candidate meets never depends on which
+  // candidates came before it. The rest of the margin is for rounding.
+  reach_um += static_cast<float>(ws_.voxels.edge_um());
   for (; covered_ < ws_.by_gap.size() && ws_.by_gap[covered_].gap_um <= 1.0001F * reach_um + 0.001F; ++covered_) {
     const Workspace::Neighbour& other = ws_.by_gap[covered_];
     ws_.voxels.add(ws_.rasters.of(other.id, *other.body, ws_.overlap.work));

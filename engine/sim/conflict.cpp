@@ -10,7 +10,8 @@
 // An undecided division may have other items of its own cell before it in the horizon, which change c and B. So what it may
 // write later is bounded by W', the same with "a point of B" for c where a settling comes before (the nucleus comes to rest
 // among points of B) or a move does, and then with B grown by step_um (one move at most: its delay is not shorter than the
-// window). Else, and for the other kinds, W' = W. After a division nothing that was due for its cell before is left.
+// window). A move that is due after a division of its cell is left (the cell that keeps the id keeps it) and is one of a body that the
+// division places: W' is B grown by search_reach_um (c is a point of B, or comes to be one) and step_um. Else, and for settlings, W' = W.
 //
 // What is written, of all that decisions about other cells read:
 //   bodies     inside W'.
@@ -98,6 +99,9 @@ Rect ConflictBounds::change_now(const Colony& colony, const AgendaItem& item) co
 Rect ConflictBounds::change_later(const Colony& colony, const AgendaItem& item) const {
   const Cell& cell = colony.cell(item.cell_id);
   const bool moves = cell.move_due_h && *cell.move_due_h <= item.due_h;
+  if (item.kind == DueKind::kMove && cell.due_h && *cell.due_h <= item.due_h) {
+    return grown(rect_of(colony.body(item.cell_id).box()), reach_um_ + step_um_ + kSlack_um);  // of a body that the division places
+  }
   if (item.kind != DueKind::kDivide || (!cell.settle_due_h && !moves)) return change_now(colony, item);
   return grown(rect_of(colony.body(item.cell_id).box()), reach_um_ + (moves ? step_um_ : 0.0) + kSlack_um);
 }

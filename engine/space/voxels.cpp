@@ -93,6 +93,7 @@ double voxel_edge_um(const Params& params) {
 VoxelCounts::VoxelCounts(const Params& params) : edge_um_(voxel_edge_um(params)) {
   n_ = static_cast<std::int32_t>(2.0 * search_reach_um(params) / edge_um_) + 4;
   nz_ = static_cast<std::int32_t>(body_top_max_um(params) / edge_um_) + 2;
+  CHECK(static_cast<double>(n_) * n_ * nz_ + kPadding < 8388608.0);  // an index is a float's mantissa in the kernel
   counts_.resize(static_cast<std::size_t>(n_) * static_cast<std::size_t>(n_) * static_cast<std::size_t>(nz_) + kPadding);
 }
 

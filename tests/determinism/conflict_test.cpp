@@ -10,6 +10,7 @@
 
 #include "engine/sim/conflict.hpp"
 #include "engine/sim/decide.hpp"
+#include "engine/sim/decide_move.hpp"
 #include "engine/sim/simulator.hpp"
 #include "tests/support/runs.hpp"
 #include "tests/support/scale.hpp"
@@ -50,6 +51,7 @@ DueKind kind_of(const Event& event) {
 EventBody decision(const Colony& colony, const RunSpec& spec, const AgendaItem& item) {
   Workspace workspace(spec.params);
   if (item.kind == DueKind::kSettle) return decide_settling(colony, spec.params, spec.seed, item.cell_id, workspace).body;
+  if (item.kind == DueKind::kMove) return decide_move(colony, spec.params, spec.seed, item.cell_id, item.due_h, workspace).body;
   return decide_division(colony, spec.params, spec.seed, item.cell_id, item.due_h, workspace).body;
 }
 
@@ -115,6 +117,14 @@ std::vector<std::pair<std::string, RunSpec>> scenes() {
   spec.params.wake.rule = WakeRule::kAlways;
   spec.params.wake.free_radius_um = 45.0;  // longer than the reach: waking bounds what is read and written
   all.emplace_back("wide free radius", spec);
+  // Moves, also of cells that divide before them in the same horizon.
+  spec = testing::spec_of(2, 100'000, *preset("young-colony"));
+  spec.params.motility.rate_per_h = 0.5;
+  spec.params.founders.count = 60;
+  spec.params.founders.radius_um = 150.0;
+  spec.params.dish.radius_um = 180.0;
+  spec.until = {std::nullopt, testing::scaled(20.0, 40.0)};
+  all.emplace_back("packed, moving", spec);
   // Several layers: reach and free share are balls inside the same squares.
   all.emplace_back("layers", testing::spec_of(1, testing::scaled(120, 300), *preset("tumour")));
   spec = testing::spec_of(2, 100'000, *preset("tumour"));

@@ -61,6 +61,13 @@ std::vector<Scene> scenes() {
   all.push_back({"retained, max", founders(5, 12, 60.0, testing::scaled(14.0, 30.0))});
   all.back().spec.params.contact.rule = ContactRule::kMax;
   all.back().spec.params.contact.neighbour_retained_min = 0.3;
+  all.push_back({"moving, packed", packed()});
+  all.back().spec.params.motility = preset("young-colony")->motility;
+  all.back().spec.params.motility.rate_per_h = 0.5;
+  // Smooth bodies, whose boxes are tight, and generations that are scored by all threads.
+  all.push_back({"smooth, retained", founders(7, 12, 60.0, testing::scaled(14.0, 30.0))});
+  all.back().spec.params.noise.amplitude = 0.0;
+  all.back().spec.params.contact.neighbour_retained_min = 0.05;
   all.push_back({"layers", testing::spec_of(6, testing::scaled(80, 300), *preset("tumour"))});
   all.push_back({"layers, packed, with a wall", packed()});
   all.back().spec.params.layers = Layers::kMulti;
@@ -94,6 +101,8 @@ TEST_F(Threads, AndWindowsDoNotShowInTheHistory) {
         if (!testing::full_run() && k != 3 && k != i % 3) continue;
         RunSpec spec = scene.spec;
         spec.params.window_h = kWindows_h[k];
+        const MotilityParams& motility = spec.params.motility;
+        if (motility.rate_per_h > 0.0) spec.params.window_h = std::min(spec.params.window_h, move_delay_min_h(motility));
         ASSERT_TRUE(validate(spec.params).empty());
         ASSERT_TRUE(history(spec, kThreads[i]) == serial)
             << scene.name << ": " << kThreads[i] << " threads, window " << kWindows_h[k] << " h";
