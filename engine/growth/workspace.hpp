@@ -22,7 +22,7 @@ namespace colony {
 /// evaluation: see kernel::CountWork.
 struct Work : kernel::CountWork {
   std::uint64_t search_count = 0;
-  std::uint64_t candidate_count = 0;    // candidate pairs, scored wholly or in part
+  std::uint64_t candidate_count = 0;    // candidate pairs proposed; one that is its parent again keeps the score
   Work& operator+=(const Work& other) {
     CountWork::operator+=(other);
     search_count += other.search_count;

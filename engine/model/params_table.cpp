@@ -81,7 +81,7 @@ const std::vector<ParamInfo>& table() {
       {"search.crossover_rate", "", 0, 1, false, "probability of one-point crossover", COLONY_FIELD(search.crossover_rate, double)},
       {"search.mutation_rate", "", 0, 0.5, false, "probability of flipping a bit; null = 1 / chromosome length",
        COLONY_FIELD(search.mutation_rate, MaybeReal)},
-      {"search.points", "", 64, 65536, true, "Sobol points of an evaluation", COLONY_FIELD(search.points, Whole)},
+      {"search.points", "", 64, 65536, true, "Sobol points of an evaluation in the box of a body above the dish (half as many more, up to 65,536, are laid in the cube of its own frame)", COLONY_FIELD(search.points, Whole)},
       {"search.points_final", "", 64, 65536, true, "fresh Sobol points on which the winner is scored again",
        COLONY_FIELD(search.points_final, Whole)},
       {"search.turn_max_deg", "deg", 0, 90, false, "largest turn of the splitting direction", COLONY_FIELD(search.turn_max_deg, double)},

@@ -1,7 +1,7 @@
 // window: what is due next, in serial order, and which of it can be decided already.
 // Method:  a sliding horizon: everything due before (first uncommitted due + window_h). Nothing that is committed makes
 //          anything due inside it, because every delay is at least window_h (CHECKed); so the list is the serial order, and
-//          only grows at its end. (A division may take away what else was due for its cell.) Decided items wait in their
+//          only grows at its end. (A division takes nothing away: the cell that keeps the id keeps its move. pop() allows for it.) Decided items wait in their
 //          place for their turn.
 // Threads: exclusive: during a round the caller guards every call by one mutex.
 #pragma once

@@ -78,7 +78,16 @@ const VoxelRaster& RasterCache::of(CellId id, const Body& body, kernel::CountWor
     slot.centre = body.centre_um();
     slot.to_unit = body.to_unit();
     slot.noise_offset = body.noise_offset();
+    const auto bytes_of = [](const VoxelRaster& raster) { return raster.rows.capacity() * sizeof(std::uint32_t); };
+    bytes_ -= bytes_of(slot.raster);
     make_raster(body, edge_um_, slot.raster, &work);
+    bytes_ += bytes_of(slot.raster);
+    if (bytes_ > kBytesMax) {
+      for (Slot& other : slots_) {
+        if (&other != &slot) other = Slot{};
+      }
+      bytes_ = bytes_of(slot.raster);
+    }
   }
   return slot.raster;
 }

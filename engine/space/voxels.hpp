@@ -49,9 +49,11 @@ class RasterCache {
     Vec3 noise_offset = Vec3::Zero();
     VoxelRaster raster;
   };
-  static constexpr std::size_t kSlotsMax = 8192;   // about 6 MiB when full
+  static constexpr std::size_t kSlotsMax = 8192;         // about 6 MiB with preset paper
+  static constexpr std::size_t kBytesMax = 32U << 20;    // of rasters: when more would be kept, all others go
 
   double edge_um_;
+  std::size_t bytes_ = 0;                // of the rasters kept
   std::vector<Slot> slots_;              // grows by doubling up to kSlotsMax; slot = id modulo size
 };
 
