@@ -1,5 +1,5 @@
 // sobol_kernel: the vectors behind scrambled_sobol.
-// Shapes:  arrays of n, readable and writable up to the next multiple of kScramblePadding.
+// Shapes:  arrays of n, readable and writable kScramblePadding beyond their n.
 // Threads: pure.
 #pragma once
 
@@ -9,7 +9,7 @@
 
 namespace colony {
 
-inline constexpr std::size_t kScramblePadding = 16;
+inline constexpr std::size_t kScramblePadding = 64;   // as the kernels that read point sets ask (space/overlap_kernel.hpp)
 
 /// Multipliers of Laine and Karras' hash as given by Burley 2020.
 inline constexpr std::array<std::uint32_t, 4> kLaineKarras = {0x6c50b47cU, 0xb82f1e52U, 0xc7afe638U, 0x8d22f6e6U};

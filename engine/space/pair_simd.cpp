@@ -148,7 +148,7 @@ void add_rows_kernel(const RowRange& rows, std::int32_t first_x, std::int32_t n,
   for (std::int32_t z = 0; z < rows.nz; ++z) {
     for (std::int32_t y = rows.first_y; y < rows.end_y; ++y) {
       const std::uint32_t* words = rows.words + (z * rows.ny + y) * rows.words_per_row;
-      std::uint8_t* row = counts + (z * n + y) * n;
+      std::uint8_t* row = counts + (z * n + rows.at_y + y) * n;
       for (std::int32_t word = 0; word < rows.words_per_row; ++word) {
         std::int32_t x = first_x + 32 * word;
         std::uint32_t bits = words[word];

@@ -17,9 +17,10 @@ struct RowRange {
   const std::uint32_t* words;
   std::int32_t words_per_row, ny, nz;
   std::int32_t first_y, end_y;
+  std::int32_t at_y;                 // row (z, y) of the raster is row (z, at_y + y) of the counts
 };
 
-/// Adds 1, up to 255, to counts[(z n + y) n + first_x + i] for every set bit i of row (z, y) with 0 <= first_x + i < n. Writes (unchanged)
+/// Adds 1, up to 255, to counts[(z n + at_y + y) n + first_x + i] for every set bit i of row (z, y) with 0 <= first_x + i < n. Writes (unchanged)
 /// up to 32 counts further.
 void add_rows(const RowRange& rows, std::int32_t first_x, std::int32_t n, std::uint8_t* counts);
 

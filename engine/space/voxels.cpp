@@ -115,9 +115,10 @@ void VoxelCounts::centre_on(const Vec3& pivot_um) {
 void VoxelCounts::add(const VoxelRaster& raster) {
   const std::int32_t first_y = raster.y0 - y0_;
   CHECK(raster.z0 >= 0 && raster.z0 + raster.nz < nz_);
-  const kernel::RowRange rows{raster.rows.data(), raster.words_per_row, raster.ny, raster.nz, std::max(0, -first_y), std::min(raster.ny, n_ - first_y)};
+  const kernel::RowRange rows{raster.rows.data(), raster.words_per_row, raster.ny, raster.nz, std::max(0, -first_y), std::min(raster.ny, n_ - first_y),
+                              first_y};
   if (rows.first_y >= rows.end_y) return;
-  kernel::add_rows(rows, raster.x0 - x0_, n_, counts_.data() + (raster.z0 * n_ + first_y) * n_);
+  kernel::add_rows(rows, raster.x0 - x0_, n_, counts_.data() + raster.z0 * n_ * n_);
 }
 
 }  // namespace colony

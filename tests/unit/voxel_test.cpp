@@ -293,5 +293,29 @@ TEST(VoxelFitness, DiffersLittleFromThatOfTheSamePointsInTheBodiesThemselves) {
   EXPECT_LT(rms(near_minimum), 0.028);
 }
 
+// Why a search adds neighbours an edge beyond what a candidate can reach (Scorer::cover): a cube counts as covered when its centre is, so it
+// reaches up to half an edge beyond the body. Less, and what a candidate meets would depend on the candidates scored before it.
+TEST(VoxelRaster, ReachesHalfAnEdgeBeyondItsBodyAndNoFurther) {
+  const double edge_um = voxel_edge_um(Params{});
+  double furthest = 0.0;  // in edges, along x
+  for (std::uint32_t number = 1; number <= 300; ++number) {
+    Stream stream = testing::case_stream(number);
+    const Body body(testing::spread_cell(stream, stream.uniform({-99.0, 99.0}), 0.0, 0.0), testing::smooth());
+    VoxelRaster raster;
+    make_raster(body, edge_um, raster);
+    const Box box = body.box();
+    for (std::int32_t k = 0; k < raster.nz; ++k) {
+      for (std::int32_t j = 0; j < raster.ny; ++j) {
+        for (std::int32_t i = 0; i < raster.nx; ++i) {
+          if (!raster.holds(raster.x0 + i, raster.y0 + j, raster.z0 + k)) continue;
+          furthest = std::max(furthest, (raster.x0 + i + 1) - box.high.x() / edge_um);
+        }
+      }
+    }
+  }
+  EXPECT_LE(furthest, 0.501);
+  EXPECT_GT(furthest, 0.25);  // it does happen
+}
+
 }  // namespace
 }  // namespace colony
