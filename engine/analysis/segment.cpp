@@ -248,7 +248,7 @@ GreyImage signal_of(const GreyImage& image, const SegmentOptions& options, Segme
 /// Nine levels about the answer's own; `objects` makes those of the others.
 template <class MakeObjects>
 void sweep_levels(const SegmentOptions& options, StopFlag stop, Segmentation& result, const MakeObjects& make_objects) {
-  if (!options.keep_only.empty()) return;
+  if (!options.sweep) return;
   if (options.at_threshold) options.at_threshold({result.threshold, result.pipeline, result.mask, result.labels});
   for (std::int64_t k = -kSweepSide; k <= kSweepSide; ++k) {
     const std::int64_t at = result.threshold + k * kSweepStep;

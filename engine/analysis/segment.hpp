@@ -57,7 +57,8 @@ struct SegmentOptions {
   bool clahe = false;  // even the local contrast first
   bool split = true;   // nuclei: part touching objects
   bool keep_steps = true;
-  std::string keep_only = {};  // keep only the step of this name, and make no sweep; empty: all
+  std::string keep_only = {};  // keep only the step of this name; empty: all
+  bool sweep = true;           // nine levels: most of the time
   ThresholdVisitor at_threshold = {};  // called for every level of the sweep, the answer's own first, then ascending
 };
 
@@ -83,7 +84,7 @@ struct Segmentation {
   LabelImage labels;
   std::vector<std::int64_t> areas_px;  // of label i + 1
   std::int64_t foreground_px = 0;      // sum of the areas
-  std::vector<SweepPoint> sweep;       // nine levels about the threshold, ascending
+  std::vector<SweepPoint> sweep;       // nine levels about the threshold, ascending; fewer at the ends of the scale
   std::vector<StepImage> steps;
 };
 
