@@ -43,7 +43,8 @@ std::string finding_text(const std::string& name, const BoxDimensions& found, co
              " decades at most. So the slope of the line, " + value_text(found) + " for " + boxes_of(found) + ", hangs on the range and is no dimension.";
     case Finding::kShortRange:
       return begin + "too small a range. " + value_text(found) + " for " + boxes_of(found) + ", which is " + decimals(slopes.decades) +
-             " decades: no power law can be told from another smooth curve there.";
+             " decades: no power law can be told from another smooth curve there" +
+             (found.crossover.found ? ", and even there " + course_text(slopes) + "." : ".");
     case Finding::kWandering:
       return begin + "no clear scaling. The local slopes lie between " + decimals(slopes.low) + " and " + decimals(slopes.high) +
              " and are alike over " + decimals(slopes.plateau_decades) + " decades at most. " + value_text(found) + " for " +
@@ -154,8 +155,8 @@ LineFinding judge_line(const std::string& name, const MeasuredLine& line, std::s
   }
   const BoxDimensions& found = *line.dimensions;
   result.slopes = slope_course(found);
-  result.finding = found.crossover.found                        ? Finding::kCrossover
-                   : result.slopes.decades < kDecadesMin         ? Finding::kShortRange
+  result.finding = result.slopes.decades < kDecadesMin           ? Finding::kShortRange
+                   : found.crossover.found                       ? Finding::kCrossover
                    : result.slopes.plateau_decades < kDecadesMin ? Finding::kWandering
                                                                  : Finding::kScaling;
   std::vector<std::string> alike, unlike;

@@ -1,8 +1,8 @@
 // verdict: what follows from the box counts of a line and its controls, and what does not, as a finding and in sentences.
 // Method:  slopes over kSlopeWindow neighbouring sides (a line through them: single steps swing with rounding); how far they drift (Crossover),
 //          over how many decades they stay on a plateau, how many decades were counted at all, and which controls give the same value.
-// Findings: crossover  the slopes drift: two regimes joined, the line's slope is the dimension of neither;
-//          short_range less than kDecadesMin counted: no power law can be told from another smooth curve;
+// Findings: short_range less than kDecadesMin counted: no power law can be told from another smooth curve, whatever its slopes do;
+//          crossover  the slopes drift: two regimes joined, the line's slope is the dimension of neither;
 //          wandering  no drift, but no plateau of kDecadesMin either;
 //          scaling    a plateau of kDecadesMin: a power law fits there; whether it means anything the controls say.
 // Meaning: none of these proves a fractal. A value that a control without the property also has says nothing about the property.

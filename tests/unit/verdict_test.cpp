@@ -91,6 +91,12 @@ TEST(Verdict, LessThanADecadeIsTooSmallARange) {
   EXPECT_THAT(found.sentences.front(), HasSubstr("too small a range"));
   EXPECT_THAT(found.sentences.front(), HasSubstr("0.60 decades"));
   EXPECT_THAT(text_of(found), HasSubstr("nothing about scaling"));
+  // Also where the slopes drift: then it says that as well.
+  few.sides_px = {6, 9, 13, 18, 25, 35, 50};
+  const MeasuredLine lattice = counted(hexagonal_circles(9, 25.0), few);
+  ASSERT_TRUE(lattice.dimensions->crossover.found);
+  EXPECT_EQ(judged(lattice).finding, Finding::kShortRange);
+  EXPECT_THAT(judged(lattice).sentences.front(), HasSubstr("and even there the local slopes rise from"));
 }
 
 TEST(Verdict, SlopesThatGoUpAndDownAreNoScaling) {
