@@ -47,7 +47,7 @@ std::string finding_text(const std::string& name, const BoxDimensions& found, co
              (found.crossover.found ? ", and even there " + course_text(slopes) + "." : ".");
     case Finding::kWandering:
       return begin + "no clear scaling. The local slopes lie between " + decimals(slopes.low) + " and " + decimals(slopes.high) +
-             " and are alike over " + decimals(slopes.plateau_decades) + " decades at most. " + value_text(found) + " for " +
+             " and are alike over " + decimals(slopes.plateau_decades) + " of " + decimals(slopes.decades) + " decades at most. " + value_text(found) + " for " +
              boxes_of(found) + " is a mean of them.";
     case Finding::kScaling:
       return begin + "consistent with scaling: " + value_text(found) + " for " + boxes_of(found) + ", " + decimals(slopes.decades) +
@@ -155,10 +155,12 @@ LineFinding judge_line(const std::string& name, const MeasuredLine& line, std::s
   }
   const BoxDimensions& found = *line.dimensions;
   result.slopes = slope_course(found);
-  result.finding = result.slopes.decades < kDecadesMin           ? Finding::kShortRange
-                   : found.crossover.found                       ? Finding::kCrossover
-                   : result.slopes.plateau_decades < kDecadesMin ? Finding::kWandering
-                                                                 : Finding::kScaling;
+  const SlopeCourse& slopes = result.slopes;
+  const bool has_plateau = slopes.plateau_decades >= kDecadesMin && slopes.plateau_decades >= kPlateauShareMin * slopes.decades;
+  result.finding = slopes.decades < kDecadesMin ? Finding::kShortRange
+                   : found.crossover.found      ? Finding::kCrossover
+                   : has_plateau                ? Finding::kScaling
+                                                : Finding::kWandering;
   std::vector<std::string> alike, unlike;
   for (const NamedLine& control : controls) {
     if (!control.line->dimensions) continue;

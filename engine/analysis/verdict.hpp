@@ -3,8 +3,8 @@
 //          over how many decades they stay on a plateau, how many decades were counted at all, and which controls give the same value.
 // Findings: short_range less than kDecadesMin counted: no power law can be told from another smooth curve, whatever its slopes do;
 //          crossover  the slopes drift: two regimes joined, the line's slope is the dimension of neither;
-//          wandering  no drift, but no plateau of kDecadesMin either;
-//          scaling    a plateau of kDecadesMin: a power law fits there; whether it means anything the controls say.
+//          wandering  no drift, but no plateau of kDecadesMin and of kPlateauShareMin of the range either;
+//          scaling    such a plateau: a power law fits there; whether it means anything the controls say.
 // Meaning: none of these proves a fractal. A value that a control without the property also has says nothing about the property.
 // Units:   pixels; decades of box sides.      Errors: none: a line without figures says why.      Threads: pure.
 // Source:  decades: Avnir et al. 1998 (published fractals span 1.3 decades on average, which they hold to be too few); the limits are ours.
@@ -23,6 +23,7 @@ namespace colony {
 inline constexpr std::size_t kSlopeWindow = 5;   // sides; a factor 2.9 at the usual ratio 1.3, about a period of sets that repeat in threes
 inline constexpr double kPlateauBand = 0.15;     // slopes within it of each other are alike
 inline constexpr double kDecadesMin = 1.0;
+inline constexpr double kPlateauShareMin = 0.75;  // exact fractals 1.0, smooth outlines from 0.8, scattered colonies 0.6
 inline constexpr double kBoxBias = 0.05;         // of generic boxes: a difference within it is none
 
 /// Lines that were counted, or why not.

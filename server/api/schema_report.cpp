@@ -46,7 +46,7 @@ Json findings_schema() {
   Json line = Json::object();
   for (const char* name : {"decades", "plateau_decades", "slope_small_boxes", "slope_large_boxes"}) line[name] = nullable_number();
   line["finding"] = {{"enum", {"no_figures", "crossover", "short_range", "wandering", "scaling"}},
-                     {"description", "scaling: a power law fits over a decade or more; no other is a dimension, and this one proves no fractal"}};
+                     {"description", "scaling: a power law fits over a decade and three quarters of the range or more; no other is a dimension, and this one proves no fractal"}};
   line["decades"]["description"] = "of box sides counted";
   line["plateau_decades"]["description"] = "longest range over which the local slopes are alike";
   line["like_controls"] = described(texts(), "controls with the same D0 within errors and bias: the value says nothing that they do not");
