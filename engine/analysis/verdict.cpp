@@ -170,7 +170,9 @@ LineFinding judge_line(const std::string& name, const MeasuredLine& line, std::s
     (differs ? unlike : alike).push_back(control.name + " (" + with_error(other) + ")");
   }
   result.sentences.push_back(finding_text(name, found, result));
-  const std::string plain = plain_text(name, found);
+  // A slope that is only a mean of others is the dimension of nothing, not even of a line.
+  const bool is_one_value = result.finding == Finding::kScaling || result.finding == Finding::kShortRange;
+  const std::string plain = is_one_value ? plain_text(name, found) : std::string();
   if (!plain.empty()) result.sentences.push_back(plain);
   if (!alike.empty()) {
     result.sentences.push_back("The control" + std::string(alike.size() > 1 ? "s " : " ") + joined(alike) + (alike.size() > 1 ? " give" : " gives") +
