@@ -231,7 +231,8 @@ std::string curves_svg(const std::vector<Curve>& curves, const std::string& x_ti
   }
   text((kLeft + kWidth) / 2, kHeight - 10, "middle", x_title, "#000");
   text(kLeft, kTop - 3, "start", y_title, "#000");
-  double legend = kTop + 16;
+  // Where curves usually are not: log-log ones fall to the right, the others rise or lie high.
+  double legend = is_logarithmic ? kTop + 16 : kHeight - kBottom - 6 - 15 * (static_cast<double>(curves.size()) - 1);
   for (const Curve& curve : curves) {
     if (curve.points.empty()) continue;
     std::string path;
