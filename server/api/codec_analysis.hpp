@@ -7,6 +7,7 @@
 #include <string>
 
 #include "engine/base/result.hpp"
+#include "server/api/compare.hpp"
 #include "server/api/json.hpp"
 #include "server/store/analyses.hpp"
 
@@ -16,8 +17,13 @@ namespace colony::server::api {
 struct ComparisonSpec {
   std::string job_id, analysis_id, name;
   std::optional<double> at_h;
+  MatchRequest match;
 };
 Result<ComparisonSpec> decode_comparison_spec(const Json& body);
+
+/// As stored with a comparison, and back; what an older program stored has its matching, by area. CHECKs.
+Json encode_match_request(const MatchRequest& match);
+MatchRequest decode_match_request(const std::string& options_json);
 
 /// The member `result` is left out of lists.
 Json encode_analysis(const AnalysisRow& row, bool with_result);

@@ -150,6 +150,17 @@ Json encode_line(const MeasuredLine& line) {
           {"reason", nullptr}};
 }
 
+Json encode_controls(const std::vector<ControlReport>& controls) {
+  Json list = Json::array();
+  for (const ControlReport& control : controls) {
+    list.push_back({{"name", control.name},
+                    {"placement", name_of(control.placement)},
+                    {"walls", encode_line(control.lines.walls)},
+                    {"outline", encode_line(control.lines.outline)}});
+  }
+  return list;
+}
+
 Json encode_findings(const LineFindings& findings) {
   const auto one = [](const LineFinding& line) -> Json {
     if (line.finding == Finding::kNoFigures) {
@@ -183,12 +194,6 @@ Json encode_threshold_sweep(const ThresholdSweep& sweep) {
 }
 
 Json encode_report(const LabelReport& report) {
-  Json controls = Json::array();
-  for (const ControlReport& control : report.controls) {
-    controls.push_back({{"name", control.name},
-                        {"walls", encode_line(control.lines.walls)},
-                        {"outline", encode_line(control.lines.outline)}});
-  }
   return {{"um_per_px", or_null(report.um_per_px)},
           {"cell_count", report.cell_count},
           {"cell_area_mean_px", report.cell_area_mean_px},
@@ -196,7 +201,8 @@ Json encode_report(const LabelReport& report) {
           {"verdict", report.verdict},
           {"findings", encode_findings(report.findings)},
           {"fractal", {{"walls", encode_line(report.lines.walls)}, {"outline", encode_line(report.lines.outline)}}},
-          {"controls", std::move(controls)},
+          {"controls", encode_controls(report.controls)},
+          {"object_cover", report.object_cover},
           {"colony", encode_colony(report.colony, report.um_per_px)},
           {"cells",
            {{"area_px", spread(report.shapes, [](const Shape& s) { return static_cast<double>(s.area_px); })},

@@ -7,6 +7,7 @@ namespace colony::server::api {
 namespace {
 
 constexpr double kSeqMax = 9e15;
+constexpr double kObjectAreaMax_px = kImageSideMax_px * kImageSideMax_px;
 constexpr std::string_view kJson = "application/json";
 constexpr std::string_view kNdjson = "application/x-ndjson";
 constexpr std::string_view kCsv = "text/csv";
@@ -235,7 +236,13 @@ std::vector<Endpoint> make_endpoints() {
         {"channel", QueryType::kInteger, 0, 15, {}, "from 0; an image of several channels needs one"},
         {"threshold", QueryType::kInteger, 0, 254, {}, "of the step `signal`; default by Otsu"},
         {"pipeline", QueryType::kName, 0, 0, {"auto", "nuclei", "phase", "contours"}, "default auto"},
-        {"clahe", QueryType::kBoolean, 0, 0, {}, "even the local contrast first; default false"}},
+        {"clahe", QueryType::kBoolean, 0, 0, {}, "even the local contrast first; default false"},
+        {"split", QueryType::kBoolean, 0, 0, {}, "nuclei: part touching objects; default true"},
+        {"area_min_px", QueryType::kInteger, 1, kObjectAreaMax_px, {}, "the smallest object; default by the picture"},
+        {"hole_max_px", QueryType::kInteger, 0, kObjectAreaMax_px, {}, "the largest hole that is filled; default by the picture"},
+        {"background_reach_px", QueryType::kInteger, 3, kImageSideMax_px, {},
+         "nuclei: wider than any object; default a quarter of the shorter side"},
+        {"window_radius_px", QueryType::kInteger, 1, 50, {}, "phase: of the local deviation; default 3"}},
        {{201, "the analysis with its result"}, {202, "the analysis, to be worked on"}},
        "Analysis",
        {kMalformed, kUnsupportedMediaType, kLimit, kBusy},

@@ -20,11 +20,20 @@ Enum enum_of(const Query& query, std::string_view name, std::initializer_list<st
 ImageOptions options_of(const Query& query) {
   ImageOptions options;
   options.um_per_px = query.number("um_per_px");
-  if (const auto channel = query.integer("channel")) options.channel = static_cast<std::int64_t>(*channel);
+  const auto whole = [&](const char* name) -> std::optional<std::int64_t> {
+    const auto value = query.integer(name);
+    return value ? std::optional(static_cast<std::int64_t>(*value)) : std::nullopt;
+  };
+  options.channel = whole("channel");
   options.pipeline = enum_of<Pipeline>(query, "pipeline", {"auto", "nuclei", "phase", "contours"});
   options.foreground = enum_of<Foreground>(query, "foreground", {"auto", "light", "dark"});
   if (const auto threshold = query.integer("threshold")) options.threshold = static_cast<int>(*threshold);
   options.clahe = query.boolean("clahe", false);
+  options.split = query.boolean("split", true);
+  options.area_min_px = whole("area_min_px");
+  options.hole_max_px = whole("hole_max_px");
+  options.background_reach_px = whole("background_reach_px");
+  options.window_radius_px = whole("window_radius_px").value_or(options.window_radius_px);
   return options;
 }
 

@@ -28,10 +28,11 @@ Result<LabelledColony> label_colony(const Colony& colony, const PictureSpec& spe
   return out;
 }
 
-Result<LabelReport> measure_colony(const ColonyAt& at, const LabelledColony& image, const Effort& effort) {
+Result<LabelReport> measure_colony(const ColonyAt& at, const LabelledColony& image, const Effort& effort, ObjectKind objects) {
   LabelInput input;
   input.labels = &image.labels;
-  input.without_noise = &image.without_noise;
+  input.objects = objects;
+  if (objects == ObjectKind::kCells) input.without_noise = &image.without_noise;
   input.siblings = sibling_pairs(*at.colony);
   input.active = active_labels(*at.colony);
   input.control_seed = at.spec->seed;

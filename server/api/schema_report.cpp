@@ -102,7 +102,8 @@ Json report_properties() {
       numbers({"share", "apart_area_cv", "apart_circularity_sd", "other_area_cv", "other_circularity_sd"});
   apart["apart_count"] = apart["other_count"] = count();
   const Json lines = {{"walls", reference("MeasuredLine")}, {"outline", reference("MeasuredLine")}};
-  Json control = {{"name", {{"enum", {"without_noise", "hexagonal", "random_discs"}}}}};
+  Json control = {{"name", {{"enum", {"without_noise", "hexagonal", "random_discs"}}}},
+                  {"placement", {{"enum", {"same_places", "touching", "spread"}}}}};
   control.update(lines);
   return {{"um_per_px", nullable_number()},
           {"cell_count", count()},
@@ -112,6 +113,7 @@ Json report_properties() {
           {"findings", reference("Findings")},
           {"fractal", strict_object(lines)},
           {"controls", list(strict_object(std::move(control)))},
+          {"object_cover", described(number(), "share of their convex hull that the labels take; below 0.7 controls are spread over it")},
           {"colony", colony_schema()},
           {"cells", strict_object(std::move(cells))},
           {"neighbours", neighbours_schema()},
