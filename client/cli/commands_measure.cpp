@@ -108,8 +108,9 @@ ExitCode measure(Session& session, const FileOptions& options) {
 
 struct AnalyzeOptions {
   std::string file, steps, objects, html;
-  std::optional<std::string> name, um_per_px, foreground, channel, threshold, pipeline;
-  bool clahe = false;
+  std::optional<std::string> name, um_per_px, foreground, channel, threshold, pipeline, area_min_px, hole_max_px, background_reach_px,
+      window_radius_px;
+  bool clahe = false, no_split = false;
 };
 
 /// By the first bytes, as the server does; Failure kUsage for anything else.
@@ -194,8 +195,13 @@ ExitCode analyze(Session& session, const AnalyzeOptions& options) {
       .add_if("foreground", options.foreground)
       .add_if("channel", options.channel)
       .add_if("threshold", options.threshold)
-      .add_if("pipeline", options.pipeline);
+      .add_if("pipeline", options.pipeline)
+      .add_if("area_min_px", options.area_min_px)
+      .add_if("hole_max_px", options.hole_max_px)
+      .add_if("background_reach_px", options.background_reach_px)
+      .add_if("window_radius_px", options.window_radius_px);
   if (options.clahe) target.add("clahe", "true");
+  if (options.no_split) target.add("split", "false");
   request.target = target.text();
   const Json row = when_done(session, session.client().send(request));
   if (!options.steps.empty()) save_steps(session, row, options.steps);
@@ -228,13 +234,22 @@ ExitCode analyze(Session& session, const AnalyzeOptions& options) {
 
 struct CompareOptions {
   std::string id, analysis_id, figure;
-  std::optional<std::string> at_h, name;
+  std::optional<std::string> at_h, name, match, cell_count, cell_area_px;
 };
 
 ExitCode compare(Session& session, const CompareOptions& options) {
   Json body = {{"job_id", resolve_job_id(session, options.id)}, {"analysis_id", options.analysis_id}};
   if (options.at_h) body["at_h"] = number_option("--at-h", *options.at_h);
   if (options.name) body["name"] = *options.name;
+  if (options.match) body["match"] = *options.match;
+  if (options.cell_count) {
+    const double count = number_option("--cell-count", *options.cell_count);
+    if (!(count >= 1.0 && count <= 1e9 && count == static_cast<double>(static_cast<std::int64_t>(count)))) {
+      throw Failure(ExitCode::kUsage, "--cell-count: must be a whole number");
+    }
+    body["cell_count"] = static_cast<std::int64_t>(count);
+  }
+  if (options.cell_area_px) body["cell_area_px"] = number_option("--cell-area-px", *options.cell_area_px);
   HttpRequest request;
   request.method = "POST";
   request.target = "/v1/comparisons";
@@ -250,8 +265,8 @@ ExitCode compare(Session& session, const CompareOptions& options) {
   const Json& result = row.at("result");
   session.env.out << "comparison " << row.at("id").get<std::string>() << '\n';
   for (const char* side : {"simulated", "real"}) {
-    session.env.out << side << ", " << member_text(result.at(side), "cell_count") << " cells of "
-                    << member_text(result.at(side), "cell_area_mean_px", 0) << " px\n";
+    session.env.out << side << ", " << member_text(result.at(side), "object_count") << ' ' << printable(member_text(result.at(side), "object_kind"))
+                    << " of " << member_text(result.at(side), "object_area_mean_px", 0) << " px\n";
     print_lines(session.env.out, result.at(side));
   }
   print_verdict(session.env.out, result);
@@ -294,6 +309,11 @@ void add_measure_commands(CLI::App& app, Session& session, Action& action) {
   command->add_option("--threshold", picture->threshold, "0 to 254 (default: by Otsu)");
   command->add_option("--pipeline", picture->pipeline, "auto, nuclei, phase or contours");
   command->add_flag("--clahe", picture->clahe, "Even the local contrast first");
+  command->add_flag("--no-split", picture->no_split, "nuclei: leave touching objects together");
+  command->add_option("--area-min-px", picture->area_min_px, "Smallest object (default: by the picture)");
+  command->add_option("--hole-max-px", picture->hole_max_px, "Largest hole that is filled (default: by the picture)");
+  command->add_option("--background-reach-px", picture->background_reach_px, "nuclei: wider than any object (default: a quarter of the shorter side)");
+  command->add_option("--window-radius-px", picture->window_radius_px, "phase: of the local deviation (default: 3)");
   command->add_option("--steps", picture->steps, "Folder for a picture of every step");
   command->add_option("--objects", picture->objects, "File for the shape of each object (CSV)");
   command->add_option("--html", picture->html, "File for everything on one page");
@@ -305,6 +325,9 @@ void add_measure_commands(CLI::App& app, Session& session, Action& action) {
   command->add_option("ANALYSIS", both->analysis_id, "Id of the analysis, as `analyze` prints it")->required();
   command->add_option("--at-h", both->at_h, "Model time, h (default: now, or the end)");
   command->add_option("--name", both->name, "A name for people");
+  command->add_option("--match", both->match, "object_area or um_per_px (default: object_area)");
+  command->add_option("--cell-count", both->cell_count, "How many cells the picture's objects are, if they are no cells");
+  command->add_option("--cell-area-px", both->cell_area_px, "Or the mean area of a cell in the picture");
   command->add_option("--figure", both->figure, "File for the figure (PNG)");
   command->callback([&session, &action, both] { action = [&session, both] { return compare(session, *both); }; });
 }

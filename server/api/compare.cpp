@@ -60,7 +60,7 @@ Json judge(const std::string& name, const MeasuredLine& simulated, const Measure
 
 // Of both sides, each with its own name where the names differ.
 std::string both_names(const std::string& simulated, const std::string& real) {
-  return simulated == real ? "The " + simulated : "The " + simulated + " of the colony and the " + real + " of the picture";
+  return simulated == real ? "The " + simulated : "The colony's " + (simulated == "colony outline" ? "outline" : simulated) + " and the picture's " + real;
 }
 
 std::string counted(std::uint64_t count, ObjectKind kind) {

@@ -15,8 +15,9 @@ namespace {
 
 constexpr double kPanelWidth_px = 740, kContourHeight_px = 620, kCountHeight_px = 560, kSlopeHeight_px = 250;
 constexpr double kLeft_px = 96, kBetween_px = 104, kRight_px = 28;
-constexpr double kTitle_px = 52, kRowGap_px = 96, kBottom_px = 60;
-constexpr Ink kBlack{0, 0, 0}, kAxis{0x40, 0x40, 0x40}, kGrid{0xe6, 0xe6, 0xe6}, kBand{0xf4, 0xf6, 0xfa};
+constexpr double kTitle_px = 52, kRowGap_px = 60, kAxisText_px = 62, kLegendRow_px = 26, kBottom_px = 66;
+constexpr Ink kBlack{0, 0, 0}, kAxis{0x40, 0x40, 0x40}, kGrid{0xe6, 0xe6, 0xe6}, kBand{0xf1, 0xf4, 0xf9}, kPictureFrame{0xc8, 0xc8, 0xc8};
+constexpr double kBar_px = 60.0;  // of a panel, for the scale bar
 constexpr Ink kOutlineInk{0x1f, 0x77, 0xb4};
 
 struct Panel {
@@ -56,15 +57,25 @@ PixelBox united(const PixelBox& a, const PixelBox& b) {
 
 /// Pixels of the image for one of the panel.
 double step_of(const Drawing& drawing) {
-  constexpr double kFill = 0.94, kBar_px = 60.0;
+  constexpr double kFill = 0.94;
   return std::max(static_cast<double>(drawing.part.width) / (kFill * kPanelWidth_px),
                   static_cast<double>(drawing.part.height) / (kFill * (kContourHeight_px - kBar_px)));
 }
 
+/// Where the upper left corner of the part lies: in the middle of the panel, above the scale bar.
+CanvasPoint corner_of(const Panel& panel, const Drawing& drawing, double step) {
+  return {panel.x + (panel.width - static_cast<double>(drawing.part.width) / step) / 2.0,
+          panel.y + (panel.height - kBar_px - static_cast<double>(drawing.part.height) / step) / 2.0};
+}
+
+void draw_picture_frame(Canvas& canvas, const Panel& panel, const Drawing& drawing, double step) {
+  canvas.box(corner_of(panel, drawing, step), static_cast<double>(drawing.part.width) / step, static_cast<double>(drawing.part.height) / step,
+             kPictureFrame, false);
+}
+
 /// A line one pixel wide stays black when several pixels share one of the panel: its ink is spread over the width of a line there, not of the area.
 void draw_ink(Canvas& canvas, const Panel& panel, const Drawing& drawing, const BinaryImage& lines, double step, Ink ink) {
-  const double x = panel.x + (panel.width - static_cast<double>(drawing.part.width) / step) / 2.0;
-  const double y = panel.y + (panel.height - 60.0 - static_cast<double>(drawing.part.height) / step) / 2.0;
+  const auto [x, y] = corner_of(panel, drawing, step);
   const auto width = static_cast<std::int64_t>(panel.width), height = static_cast<std::int64_t>(panel.height);
   std::vector<float> dark(static_cast<std::size_t>(width * height), 0.0F);
   const std::int64_t repeat = std::max<std::int64_t>(1, static_cast<std::int64_t>(2.0 / step));  // finer than the panel's pixels
@@ -166,8 +177,6 @@ void draw_counts(Canvas& canvas, const Panel& panel, const Axes& axes, const std
     canvas.text({panel.x - 10.0, y + 6.0}, format("%.0f", count), kAxis, Align::kRight);
   }
   canvas.text({panel.x + panel.width, panel.y + panel.height + 50.0}, "box side s, px", kAxis, Align::kRight);
-  double text_y = panel.y + 30.0;
-  const double text_x = panel.x + panel.width - 14.0;
   // Controls first: the lines in question lie over them.
   for (const bool is_control : {true, false}) {
     for (const Curve& curve : curves) {
@@ -198,23 +207,30 @@ void draw_counts(Canvas& canvas, const Panel& panel, const Axes& axes, const std
       for (std::size_t i = 0; i < points.size(); ++i) canvas.dot(points[i], 4.5, curve.ink, i < fit.counts.size());
     }
   }
+  draw_frame(canvas, panel);
+}
+
+/// Below the plot, since its curves may run anywhere in it.
+void draw_legend(Canvas& canvas, const Panel& panel, const std::vector<Curve>& curves) {
+  double y = panel.y + 16.0;
+  const double text_x = panel.x + 52.0, value_x = panel.x + 330.0;
+  const BoxDimensions* fitted = nullptr;
   for (const Curve& curve : curves) {
-    std::string text = curve.name;
+    canvas.line({panel.x, y - 5.0}, {panel.x + 38.0, y - 5.0}, curve.ink, curve.is_control ? 1.5 : 2.0);
+    if (!curve.is_control) canvas.dot({panel.x + 19.0, y - 5.0}, 4.5, curve.ink, true);
+    canvas.text({text_x, y}, curve.name, kBlack);
     if (curve.compared->dimensions) {
       const Dimension& d0 = curve.compared->dimensions->capacity;
-      text += format(": D0 %.3f +- %.3f, r2 %.3f", d0.value, d0.standard_error, d0.r2);
+      canvas.text({value_x, y}, format("D0 %.3f +- %.3f, r2 %.3f", d0.value, d0.standard_error, d0.r2), kBlack);
+      if (!curve.is_control && fitted == nullptr) fitted = &*curve.compared->dimensions;
     } else {
-      text += ": too few box sides";
+      canvas.text({value_x, y}, "too few box sides in common", kBlack);
     }
-    canvas.text({text_x, text_y}, text, curve.ink, Align::kRight);
-    text_y += 26.0;
+    y += kLegendRow_px;
   }
-  if (with_fit != curves.end()) {
-    const BoxDimensions& found = *with_fit->compared->dimensions;
-    canvas.text({text_x, text_y}, format("fitted: boxes of %.0f to %.0f px", static_cast<double>(found.side_min_px), static_cast<double>(found.side_max_px)),
-                kAxis, Align::kRight);
-  }
-  draw_frame(canvas, panel);
+  if (fitted == nullptr) return;
+  canvas.text({text_x, y}, format("D0: minus the slope, for boxes of %.0f to %.0f px (shaded), the range of both", static_cast<double>(fitted->side_min_px),
+                                  static_cast<double>(fitted->side_max_px)), kAxis);
 }
 
 struct SlopeRange {
@@ -279,12 +295,11 @@ std::string counted(const char* letter, const char* whose, std::uint64_t count, 
 std::string comparison_figure(const Comparison& comparison) {
   const auto walls = cell_walls(comparison.image.labels), outline = colony_outline(comparison.image.labels);
   CHECK(walls && outline);  // they were measured
-  Drawing drawings[2] = {{&*walls, &*outline, {}}, {&comparison.real.walls, &comparison.real.outline, {}}};
-  double step = 0.25;
-  for (Drawing& drawing : drawings) {
-    drawing.part = united(foreground_box(*drawing.walls), foreground_box(*drawing.outline));
-    step = std::max(step, step_of(drawing));
-  }
+  // Of the colony what is drawn; of the picture all of its frame, which cuts things.
+  const Drawing drawings[2] = {{&*walls, &*outline, united(foreground_box(*walls), foreground_box(*outline))},
+                               {&comparison.real.walls, &comparison.real.outline,
+                                {0, 0, comparison.real.walls.width_px, comparison.real.walls.height_px}}};
+  const double step = std::max({0.25, step_of(drawings[0]), step_of(drawings[1])});
   const std::vector<Curve> curves[2] = {
       curves_of(comparison.simulated.lines, comparison.simulated.controls, comparison.simulated_side, comparison.match.simulated),
       curves_of(comparison.real.lines, comparison.real.controls, comparison.real_side, comparison.real.objects)};
@@ -300,7 +315,9 @@ std::string comparison_figure(const Comparison& comparison) {
   if (axes.x_high == 0.0) axes = {1.0, 10.0, 1.0, 10.0};
   axes = {axes.x_low / 1.12, axes.x_high * 1.12, axes.y_low / 1.4, axes.y_high * 1.4};
 
-  const double count_y = kTitle_px + kContourHeight_px + kRowGap_px, slope_y = count_y + kCountHeight_px + kRowGap_px + 8.0;
+  const double rows = static_cast<double>(std::max(curves[0].size(), curves[1].size())) + 1.0;
+  const double count_y = kTitle_px + kContourHeight_px + kRowGap_px, legend_y = count_y + kCountHeight_px + kAxisText_px;
+  const double slope_y = legend_y + rows * kLegendRow_px + kRowGap_px;
   Canvas canvas(static_cast<std::int64_t>(kLeft_px + 2.0 * kPanelWidth_px + kBetween_px + kRight_px),
                 static_cast<std::int64_t>(slope_y + kSlopeHeight_px + kBottom_px));
   for (int i = 0; i < 2; ++i) {
@@ -313,12 +330,14 @@ std::string comparison_figure(const Comparison& comparison) {
                                    format(", %.0f h", comparison.at.time_h)
                              : counted("b", "real", comparison.real.object_count, comparison.real.objects),
                 kBlack, Align::kLeft, 16.0);
+    if (!is_simulated) draw_picture_frame(canvas, contours, drawings[i], step);
     draw_ink(canvas, contours, drawings[i], *drawings[i].walls, step, kBlack);
     draw_ink(canvas, contours, drawings[i], *drawings[i].outline, step, kOutlineInk);
     draw_bar(canvas, contours, step, is_simulated ? std::optional(comparison.um_per_px) : comparison.real.analysis.um_per_px);
     draw_frame(canvas, contours);
     canvas.text({x, count_y - 16.0}, std::string(is_simulated ? "(c)" : "(d)") + " boxes met, N(s)", kBlack, Align::kLeft, 16.0);
     draw_counts(canvas, counts, axes, curves[i]);
+    draw_legend(canvas, {x, legend_y, kPanelWidth_px, 0.0}, curves[i]);
     canvas.text({x, slope_y - 16.0}, std::string(is_simulated ? "(e)" : "(f)") + " slope of N(s) through " + std::to_string(kSlopeWindow) + " sides", kBlack,
                 Align::kLeft, 16.0);
     draw_slopes(canvas, course, axes, slopes, curves[i]);
