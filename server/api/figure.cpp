@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kPanelWidth_px = 740, kContourHeight_px = 620, kCountHeight_px = 560, kSlopeHeight_px = 250;
 constexpr double kLeft_px = 96, kBetween_px = 104, kRight_px = 28;
-constexpr double kTitle_px = 52, kRowGap_px = 60, kAxisText_px = 62, kLegendRow_px = 26, kBottom_px = 66;
+constexpr double kTitle_px = 52, kRowGap_px = 60, kAxisText_px = 70, kLegendRow_px = 26, kBottom_px = 66;
 constexpr Ink kBlack{0, 0, 0}, kAxis{0x40, 0x40, 0x40}, kGrid{0xe6, 0xe6, 0xe6}, kBand{0xf1, 0xf4, 0xf9}, kPictureFrame{0xc8, 0xc8, 0xc8};
 constexpr double kBar_px = 60.0;  // of a panel, for the scale bar
 constexpr Ink kOutlineInk{0x1f, 0x77, 0xb4};
@@ -229,7 +229,7 @@ void draw_legend(Canvas& canvas, const Panel& panel, const std::vector<Curve>& c
     y += kLegendRow_px;
   }
   if (fitted == nullptr) return;
-  canvas.text({text_x, y}, format("D0: minus the slope, for boxes of %.0f to %.0f px (shaded), the range of both", static_cast<double>(fitted->side_min_px),
+  canvas.text({text_x, y}, format("D0 = -slope, fitted for boxes of %.0f to %.0f px (shaded)", static_cast<double>(fitted->side_min_px),
                                   static_cast<double>(fitted->side_max_px)), kAxis);
 }
 
@@ -269,6 +269,9 @@ void draw_slopes(Canvas& canvas, const Panel& panel, const Axes& axes, const Slo
   draw_frame(canvas, panel);
 }
 
+/// Of single things the outer outline is that of each, and would only hide the other line.
+bool has_outline(ObjectKind kind) { return kind == ObjectKind::kCells || kind == ObjectKind::kRegions; }
+
 std::vector<Curve> curves_of(const LineReport& all, const std::vector<ControlReport>& controls, const ComparedSide& side, ObjectKind kind) {
   const LineNames names = line_names(kind);
   std::vector<Curve> curves;
@@ -276,7 +279,7 @@ std::vector<Curve> curves_of(const LineReport& all, const std::vector<ControlRep
     if (line.dimensions) curves.push_back({name, &line, &compared, ink, is_control});
   };
   add(names.walls, all.walls, side.lines.walls, kBlack, false);
-  add(names.outline, all.outline, side.lines.outline, kOutlineInk, false);
+  if (has_outline(kind)) add(names.outline, all.outline, side.lines.outline, kOutlineInk, false);
   for (std::size_t i = 0; i < controls.size(); ++i) {
     const std::string& name = controls[i].name;
     const bool is_smooth = name == "without_noise", is_hexagonal = name == "hexagonal";
@@ -332,7 +335,9 @@ std::string comparison_figure(const Comparison& comparison) {
                 kBlack, Align::kLeft, 16.0);
     if (!is_simulated) draw_picture_frame(canvas, contours, drawings[i], step);
     draw_ink(canvas, contours, drawings[i], *drawings[i].walls, step, kBlack);
-    draw_ink(canvas, contours, drawings[i], *drawings[i].outline, step, kOutlineInk);
+    if (has_outline(is_simulated ? comparison.match.simulated : comparison.real.objects)) {
+      draw_ink(canvas, contours, drawings[i], *drawings[i].outline, step, kOutlineInk);
+    }
     draw_bar(canvas, contours, step, is_simulated ? std::optional(comparison.um_per_px) : comparison.real.analysis.um_per_px);
     draw_frame(canvas, contours);
     canvas.text({x, count_y - 16.0}, std::string(is_simulated ? "(c)" : "(d)") + " boxes met, N(s)", kBlack, Align::kLeft, 16.0);

@@ -100,7 +100,9 @@ test('a job is seen, measured and compared', async (t) => {
     const made = await server.post('/v1/comparisons', { job_id: job.id, analysis_id: analysis.id, name: 'discs' });
     assert.equal(made.status, 201, made.text);
     const { simulated, real } = made.json.result;
-    assert.ok(Math.abs(simulated.cell_area_mean_px / real.cell_area_mean_px - 1) < 0.02);
+    assert.ok(Math.abs(simulated.object_area_mean_px / real.object_area_mean_px - 1) < 0.02);
+    assert.equal(simulated.object_kind, 'nuclei', 'nuclei with nuclei');
+    assert.match(made.json.result.verdict[0], /^Matched by area: a nucleus of the colony/);
     assert.equal(made.headers.location, made.json.links.self);
     const figure = await server.get(made.json.links.figure);
     assert.ok(pngFacts(figure.body).width > 1000);
@@ -166,7 +168,7 @@ test('bad pictures are refused with a reason, and nothing is kept', async (t) =>
     assert.equal((await sendPicture(server, good, '', type)).status, 415, type);
   }
   assert.equal((await sendPicture(server, good, '', 'image/jpeg')).status, 422);
-  for (const query of ['?channel=7', '?um_per_px=0', '?threshold=255', '?pipeline=magic', '?foreground=grey', '?colour=1']) {
+  for (const query of ['?channel=7', '?um_per_px=0', '?threshold=255', '?pipeline=magic', '?foreground=grey', '?colour=1', '?split=2', '?window_radius_px=51']) {
     assert.equal((await sendPicture(server, good, query)).status, 422, query);
   }
   const large = await server.request('POST', '/v1/analyses', { body: Buffer.alloc(33_554_433), headers: { 'Content-Type': 'image/png' } });

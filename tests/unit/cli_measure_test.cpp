@@ -105,6 +105,11 @@ TEST_F(Cli, AnalyzeTellsTheChoicesTheSweepAndWhatFollows) {
   EXPECT_THAT(out(), HasSubstr("  threshold 60: walls 1.31 (se 0.037, boxes of 3 to 96 px, a crossover), outline none: has no foreground\n"));
   EXPECT_THAT(out(), HasSubstr("- The cell walls: a crossover"));
   EXPECT_EQ(read_file("o.csv"), "object_id,area_px\r\n1,9\r\n");
+  const std::size_t before = server.requests().size();
+  EXPECT_EQ(run({"analyze", path("p.tif"), "--no-split", "--area-min-px", "9", "--hole-max-px", "2000", "--background-reach-px", "60", "--window-radius-px", "5"}),
+            0) << err();
+  EXPECT_EQ(server.requests().at(before).line(),
+            "POST /v1/analyses?area_min_px=9&hole_max_px=2000&background_reach_px=60&window_radius_px=5&split=false HTTP/1.1");
   const std::string page = read_file("a.html");
   EXPECT_THAT(page, HasSubstr("Against the threshold"));
   EXPECT_THAT(page, HasSubstr("<td class=n>60</td><td class=n>1.310</td>"));
@@ -116,7 +121,7 @@ TEST_F(Cli, CompareShowsBothSidesAndKeepsTheFigure) {
   FakeServer server([](const FakeRequest& request, const FakeConnection& to) {
     if (request.line().find("/figure") != std::string::npos) return to.send(test::answer(200, "image/png", kPng));
     json side = measured_lines();
-    side.update(json{{"cell_count", 180}, {"cell_area_mean_px", 1963.4}});
+    side.update(json{{"object_kind", "regions"}, {"object_count", 180}, {"object_area_mean_px", 1963.4}});
     const json result = {{"simulated", side}, {"real", side}, {"verdict", {"no difference that box counting could show"}}};
     to.send(json_answer(201, json{{"id", "c-1"}, {"state", "succeeded"}, {"result", result}, {"links", {{"figure", "/v1/comparisons/c-1/figure"}}}}.dump()));
   });
@@ -125,9 +130,15 @@ TEST_F(Cli, CompareShowsBothSidesAndKeepsTheFigure) {
   EXPECT_EQ(json::parse(server.requests().at(0).body), (json{{"job_id", kId}, {"analysis_id", kAnalysis}, {"at_h", 150.5}}));
   EXPECT_EQ(read_file("f.png"), kPng);
   EXPECT_THAT(out(), HasSubstr("comparison c-1\nsimulated, 180 cells of 1963 px\n"));
-  EXPECT_THAT(out(), HasSubstr("real, 180 cells"));
+  EXPECT_THAT(out(), HasSubstr("real, 180 regions"));
   EXPECT_THAT(out(), HasSubstr("- no difference"));
   EXPECT_EQ(run({"compare", kId, kAnalysis, "--at-h", "soon"}), 2);
+  EXPECT_EQ(run({"compare", kId, kAnalysis, "--match", "object_area", "--cell-count", "317"}), 0) << err();
+  EXPECT_EQ(json::parse(server.requests().back().body),
+            (json{{"job_id", kId}, {"analysis_id", kAnalysis}, {"match", "object_area"}, {"cell_count", 317}}));
+  EXPECT_EQ(run({"compare", kId, kAnalysis, "--cell-count", "3.5"}), 2);
+  EXPECT_EQ(run({"compare", kId, kAnalysis, "--cell-area-px", "120.5"}), 0) << err();
+  EXPECT_EQ(json::parse(server.requests().back().body)["cell_area_px"], 120.5);
 }
 
 TEST_F(Cli, MeshAndCellsAreFiles) {
