@@ -60,15 +60,16 @@ LineReport analyse_lines(const LabelImage& labels, std::int64_t gap_px, const Bo
 }
 
 LineReport analyse_lines_like(const LineReport& like, const LabelImage& labels, const BoxOptions& boxes, StopFlag stop) {
-  const auto beside = [&](const MeasuredLine& line) {
+  const auto count = [&](const Result<BinaryImage>& line, const MeasuredLine& beside) {
     BoxOptions same = boxes;
-    if (line.dimensions) {
+    if (line && beside.dimensions) {
       same.sides_px.clear();
-      for (const BoxCount& count : line.dimensions->counts) same.sides_px.push_back(count.side_px);
+      for (const BoxCount& box : beside.dimensions->counts) same.sides_px.push_back(box.side_px);
+      same.part = foreground_box(*line);  // the grid begins where it always does: the same set has the same counts
     }
-    return same;
+    return measure_line(line, same, stop);
   };
-  return {measure_line(cell_walls(labels), beside(like.walls), stop), measure_line(colony_outline(labels), beside(like.outline), stop)};
+  return {count(cell_walls(labels), like.walls), count(colony_outline(labels), like.outline)};
 }
 
 MeasuredLine up_to(const MeasuredLine& line, std::int64_t side_max_px) {

@@ -145,8 +145,8 @@ TEST(Analyses, CountDrawnDiscsAndKeepThem) {
     EXPECT_NEAR(rows[i]["walls"]["d0"]["value"].get<double>(), result["fractal"]["walls"]["d0"]["value"].get<double>(), 0.1);
   }
   const std::string words = result["verdict"].dump();
-  EXPECT_THAT(words, HasSubstr("the cell walls could be counted at " + std::to_string(rows.size()) + " of"));
-  EXPECT_THAT(words, HasSubstr("What follows for the cell walls"));
+  EXPECT_THAT(words, HasSubstr("the outlines of the nuclei could be counted at " + std::to_string(rows.size()) + " of"));
+  EXPECT_THAT(words, HasSubstr("What follows for the outlines of the nuclei"));
   // Each object a line, in both forms.
   auto table = fixture.get(made["links"]["objects"].get<std::string>(), {{"Accept", "text/csv"}});
   const auto lines = split_lines(table.body, "\r\n");
@@ -238,10 +238,11 @@ TEST(Analyses, TakeTheChoicesOfTheSegmentation) {
   EXPECT_EQ(count("&area_min_px=9"), 3);
   EXPECT_EQ(count("&area_min_px=9&split=false"), 2);
   EXPECT_EQ(count("&area_min_px=100"), 2);
-  auto sent = send_picture(fixture, picture, "?pipeline=phase&window_radius_px=5&hole_max_px=0&background_reach_px=60");
-  const Json options = json_of(sent)["options"];
+  auto sent = send_picture(fixture, picture, "?pipeline=nuclei&window_radius_px=5&hole_max_px=500&background_reach_px=60");
+  const Json made = json_of(sent), options = made["options"];
+  EXPECT_EQ(made["result"]["segmentation"]["background_reach_px"], 60);
   EXPECT_EQ(options["window_radius_px"], 5);
-  EXPECT_EQ(options["hole_max_px"], 0);
+  EXPECT_EQ(options["hole_max_px"], 500);
   EXPECT_EQ(options["background_reach_px"], 60);
   EXPECT_TRUE(options["split"].get<bool>());
   for (const char* query : {"?window_radius_px=0", "?window_radius_px=51", "?area_min_px=0", "?hole_max_px=-1", "?background_reach_px=2", "?split=1"}) {

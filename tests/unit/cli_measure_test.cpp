@@ -129,7 +129,7 @@ TEST_F(Cli, CompareShowsBothSidesAndKeepsTheFigure) {
   EXPECT_EQ(run({"compare", kId, kAnalysis, "--at-h", "150.5", "--figure", path("f.png")}), 0) << err();
   EXPECT_EQ(json::parse(server.requests().at(0).body), (json{{"job_id", kId}, {"analysis_id", kAnalysis}, {"at_h", 150.5}}));
   EXPECT_EQ(read_file("f.png"), kPng);
-  EXPECT_THAT(out(), HasSubstr("comparison c-1\nsimulated, 180 cells of 1963 px\n"));
+  EXPECT_THAT(out(), HasSubstr("comparison c-1\nsimulated, 180 regions of 1963 px\n"));
   EXPECT_THAT(out(), HasSubstr("real, 180 regions"));
   EXPECT_THAT(out(), HasSubstr("- no difference"));
   EXPECT_EQ(run({"compare", kId, kAnalysis, "--at-h", "soon"}), 2);

@@ -43,7 +43,10 @@ TEST(Comparisons, MatchNucleiWithNucleiAndSayWhatWasMatched) {
   const std::string words = made["result"]["verdict"].dump();
   EXPECT_THAT(words, HasSubstr("Matched by area: a nucleus of the colony has"));
   EXPECT_THAT(words, HasSubstr("Nuclei are compared with nuclei"));
-  EXPECT_THAT(words, HasSubstr("The outlines of the nuclei: no comparison: the colony's has no figures"));  // six small nuclei: too few box sides
+  EXPECT_THAT(words, HasSubstr("The outlines of the nuclei: simulated "));
+  EXPECT_THAT(words, HasSubstr("the range that both have"));
+  EXPECT_EQ(made["result"]["differences"]["walls"]["range_px"], made["result"]["simulated"]["fractal"]["walls"]["d0"]["range_px"]);
+  EXPECT_EQ(made["result"]["differences"]["walls"]["range_px"], real["fractal"]["walls"]["d0"]["range_px"]);
   EXPECT_THAT(words, HasSubstr("The picture. What follows for the outlines of the nuclei"));
   EXPECT_EQ(real["threshold_sweep"]["rows"].size(), 9u);
   auto figure = fixture.get(made["links"]["figure"].get<std::string>());

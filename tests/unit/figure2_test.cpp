@@ -72,7 +72,8 @@ TEST(Figure2, PhotographsGoTheSameWayBesideTheirOwnControls) {
     // The controls fill the field as the picture's objects do, and are counted with the same boxes.
     for (const ControlReport& control : counted->controls) {
       EXPECT_EQ(control.placement, counted->object_cover < 0.7 ? Placement::kSpread : Placement::kTouching) << picture.file;
-      if (counted->lines.walls.dimensions) EXPECT_EQ(control.lines.walls.dimensions->side_max_px, counted->lines.walls.dimensions->side_max_px);
+      ASSERT_TRUE(counted->lines.walls.dimensions && control.lines.walls.dimensions) << picture.file;
+      EXPECT_EQ(control.lines.walls.dimensions->side_max_px, counted->lines.walls.dimensions->side_max_px);
     }
   }
   if (read == 0) GTEST_SKIP() << "COLONY_DATA has no pictures: not part of the project";
