@@ -189,7 +189,9 @@ LineFinding judge_line(const std::string& name, const MeasuredLine& line, std::s
   }
   if (!unlike.empty()) {
     result.sentences.push_back("The control" + std::string(unlike.size() > 1 ? "s " : " ") + joined(unlike) +
-                               (unlike.size() > 1 ? " differ" : " differs") + " by more than errors and bias: there number, size and cover of what is counted do not explain the value.");
+                               (unlike.size() > 1 ? " differ" : " differs") + " by more than errors and bias: " +
+                               (alike.empty() ? "number, size and cover of what is counted do not explain the value."
+                                              : "with number, size and cover alike the value still hangs on how things lie."));
   }
   if (alike.empty() && unlike.empty()) {
     result.sentences.push_back("No control could be counted: nothing shows what smooth cells of this number and size would give for the " + name + ".");
