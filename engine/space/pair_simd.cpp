@@ -224,6 +224,23 @@ void add_rows_kernel(const RowRange& rows, std::int32_t first_x, std::int32_t n,
   const hn::CappedTag<std::uint8_t, 32> bytes;
   const std::size_t lanes = hn::Lanes(bytes);
   const auto one = hn::Set(bytes, std::uint8_t{1});
+  const auto add_word = [&](std::uint32_t bits, std::uint8_t* to) {
+    for (std::size_t i = 0; i < 32; i += lanes) {
+      const std::uint64_t part = bits >> i;  // LoadMaskBits may read 8 bytes; lanes may be fewer than a byte's bits
+      const auto mask = hn::LoadMaskBits(bytes, reinterpret_cast<const std::uint8_t*>(&part));
+      const auto before = hn::LoadU(bytes, to + i);
+      hn::StoreU(hn::SaturatedAdd(before, hn::IfThenElseZero(mask, one)), bytes, to + i);
+    }
+  };
+  // Most rasters lie whole in the counts, a word a row; an empty row costs no more than the question whether it is.
+  if (rows.words_per_row == 1 && first_x >= 0 && first_x + 32 <= n) {
+    for (std::int32_t z = 0; z < rows.nz; ++z) {
+      const std::uint32_t* words = rows.words + z * rows.ny;
+      std::uint8_t* to = counts + (z * n + rows.at_y) * n + first_x;
+      for (std::int32_t y = rows.first_y; y < rows.end_y; ++y) add_word(words[y], to + y * n);
+    }
+    return;
+  }
   for (std::int32_t z = 0; z < rows.nz; ++z) {
     for (std::int32_t y = rows.first_y; y < rows.end_y; ++y) {
       const std::uint32_t* words = rows.words + (z * rows.ny + y) * rows.words_per_row;
@@ -236,13 +253,7 @@ void add_rows_kernel(const RowRange& rows, std::int32_t first_x, std::int32_t n,
           x = 0;
         }
         if (x + 32 > n) bits = x < n ? bits & ((1U << (n - x)) - 1U) : 0;
-        if (bits == 0) continue;
-        for (std::size_t i = 0; i < 32; i += lanes) {
-          const std::uint64_t part = bits >> i;  // LoadMaskBits may read 8 bytes; lanes may be fewer than a byte's bits
-          const auto mask = hn::LoadMaskBits(bytes, reinterpret_cast<const std::uint8_t*>(&part));
-          const auto before = hn::LoadU(bytes, row + x + i);
-          hn::StoreU(hn::SaturatedAdd(before, hn::IfThenElseZero(mask, one)), bytes, row + x + i);
-        }
+        if (bits != 0) add_word(bits, row + x);
       }
     }
   }
