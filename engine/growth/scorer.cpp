@@ -14,7 +14,6 @@ namespace colony {
 namespace {
 
 constexpr double kDropDeviations = 2.0;               // see race_to()
-constexpr float kReachToSpare = 1.05F;                // later candidates seldom reach further than the first ones by more
 constexpr std::size_t kPointsWorthThreads = 65'536;   // of a generation: 100 us
 
 std::array<std::uint32_t, 3> seeds_for(const SearchTask& task, Purpose purpose, std::uint32_t lane) {
@@ -105,9 +104,6 @@ void Scorer::race_to(double best) {
 void Scorer::score_all(std::vector<Candidate>& candidates) {
   std::size_t count = 0;
   for (const Candidate& candidate : candidates) count += candidate.fitness < 0.0 ? 1 : 0;
-  // Where cells divide all over a large dish, rasters are mostly drawn for one search: then only as far as it needs them. What is drawn cannot
-  // matter to a result: nothing beyond a candidate's reach is looked up.
-  if (reach_um_ == 0.0F) reach_um_ = ws_.rasters.misses_often() ? kReachToSpare * reach_of(candidates) : unbounded_um();
   if (ws_.threads == 1 || !is_worth_threads(count)) {
     for (Candidate& candidate : candidates) {
       if (candidate.fitness < 0.0) candidate.fitness = score(candidate.chromosome, ws_.candidate, ws_.overlap.work);
@@ -116,7 +112,10 @@ void Scorer::score_all(std::vector<Candidate>& candidates) {
   }
   // The voxels are filled first, for all of them: then scoring changes nothing but its own slot, and a slot's value does not depend on who
   // scores it or when. Isolated: a thread that waits here must not begin another event.
-  cover(reach_of(candidates));
+  for (const Candidate& candidate : candidates) {
+    ws_.genes.decode(candidate.chromosome, task_.frame, ws_.candidate);
+    cover(std::max(ws_.candidate[0].reach, ws_.candidate[1].reach));
+  }
   ws_.work_of.assign(candidates.size(), {});
   tbb::this_task_arena::isolate([&] {
     tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t i) {
@@ -203,31 +202,13 @@ Footing Scorer::footing(const kernel::PairScore& score, const std::array<kernel:
   return {on_dish, score.hits[k], score.shared[k] - score.sibling[k], score.sibling[k]};
 }
 
-float Scorer::reach_of(const std::vector<Candidate>& candidates) {
-  float reach_um = 0.0F;
-  for (const Candidate& candidate : candidates) {
-    if (!(candidate.fitness < 0.0)) continue;
-    ws_.genes.decode(candidate.chromosome, task_.frame, ws_.candidate);
-    reach_um = std::max({reach_um, ws_.candidate[0].reach, ws_.candidate[1].reach});
-  }
-  return reach_um;
-}
-
 void Scorer::cover(float reach_um) {
-  const Vec3& pivot = task_.frame.pivot_um;
-  if (reach_um > reach_um_) {  // seldom: all anew, without bound
-    ws_.voxels.centre_on(pivot);
-    covered_ = 0;
-    reach_um_ = unbounded_um();
-  }
-  const auto edge = static_cast<float>(ws_.voxels.edge_um());
-  const VoxelWindow window = ws_.voxels.window(pivot, 1.0001 * static_cast<double>(reach_um_) + 0.001);
   // A cube may be covered whose far half lies beyond the body: an edge more, so that what a candidate meets never depends on which
   // candidates came before it. The rest of the margin is for rounding.
-  reach_um += edge;
+  reach_um += static_cast<float>(ws_.voxels.edge_um());
   for (; covered_ < ws_.by_gap.size() && ws_.by_gap[covered_].gap_um <= 1.0001F * reach_um + 0.001F; ++covered_) {
     const Workspace::Neighbour& other = ws_.by_gap[covered_];
-    ws_.voxels.add(ws_.rasters.of(other.id, *other.body, ws_.overlap.work, window));
+    ws_.voxels.add(ws_.rasters.of(other.id, *other.body, ws_.overlap.work));
   }
 }
 

@@ -45,11 +45,8 @@ class Scorer {
   double score(const Chromosome& chromosome, std::array<kernel::CandidateBody, 2>& candidate, kernel::CountWork& work);
   // The voxels know how many older cells hold a point, not which: in the search they hold a body up together.
   Footing footing(const kernel::PairScore& score, const std::array<kernel::CandidateBody, 2>& candidate, std::size_t k) const;
-  // Puts into the voxels every neighbour that a body of this reach can meet, as far as such a body can meet it.
+  // Puts into the voxels every neighbour that a body of this reach can meet.
   void cover(float reach_um);
-  float unbounded_um() const { return static_cast<float>(2.0 * search_reach_um(params_)); }
-  // The longest reach among the candidates without a score.
-  float reach_of(const std::vector<Candidate>& candidates);
   bool neighbours_keep_enough(const std::array<Body, 2>& bodies);
 
   const Colony& colony_;
@@ -59,7 +56,6 @@ class Scorer {
   bool racing_ = false;
   std::array<Footing, 2> footings_;
   std::size_t covered_ = 0;   // of by_gap: those in the voxels
-  float reach_um_ = 0.0F;     // the voxels hold what lies within this of the pivot; 0: nothing yet
 };
 
 }  // namespace colony

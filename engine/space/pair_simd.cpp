@@ -159,7 +159,7 @@ class BandCubes {
 
 // Cubes of a body: see voxel_kernel.hpp. Of each row only what lies inside the noisy ellipsoid is asked: |p + x e|^2 <= 1 + band solved for x,
 // for a vector of rows at a time. The ellipsoid is widened by a thousandth: a hundred times what single precision may err by.
-void raster_kernel(const FloatBody& body, float edge, const CubeRange& range, std::int32_t ny, std::int32_t nz, std::int32_t words_per_row,
+void raster_kernel(const FloatBody& body, float edge, std::int32_t nx, std::int32_t ny, std::int32_t nz, std::int32_t words_per_row,
                    std::uint32_t* HWY_RESTRICT rows, CountWork& work) {
   const D d;
   const hn::RebindToSigned<D> integers;
@@ -174,7 +174,7 @@ void raster_kernel(const FloatBody& body, float edge, const CubeRange& range, st
   HWY_ALIGN float last[HWY_MAX_BYTES / sizeof(float)];
   for (std::int32_t k = 0; k < nz; ++k) {
     const V z = constant(edge * static_cast<float>(k));
-    for (std::int32_t first_j = range.first_y; first_j < range.end_y; first_j += lanes) {
+    for (std::int32_t first_j = 0; first_j < ny; first_j += lanes) {
       const V ys = hn::Mul(constant(edge), hn::Add(lane_numbers, constant(static_cast<float>(first_j))));
       const V u0 = row(m, body.t[0], hn::Zero(d), ys, z);
       const V v0 = row(m + 3, body.t[1], hn::Zero(d), ys, z);
@@ -187,11 +187,10 @@ void raster_kernel(const FloatBody& body, float edge, const CubeRange& range, st
       const V root = hn::Sqrt(hn::IfThenElseZero(met, discriminant));
       const V low = hn::Mul(hn::Neg(hn::Add(along, root)), in_edges);
       const V high = hn::Mul(hn::Sub(root, along), in_edges);
-      const V start = constant(static_cast<float>(range.first_x));
-      const V end = constant(static_cast<float>(range.end_x - 1));
-      hn::Store(hn::IfThenElse(hn::Gt(low, start), low, start), d, first);
+      const V end = constant(static_cast<float>(nx - 1));
+      hn::Store(hn::IfThenElse(hn::Gt(low, hn::Zero(d)), low, hn::Zero(d)), d, first);
       hn::Store(hn::IfThenElse(met, hn::IfThenElse(hn::Lt(high, end), high, end), constant(-1.0F)), d, last);
-      const std::int32_t row_count = range.end_y - first_j < lanes ? range.end_y - first_j : lanes;
+      const std::int32_t row_count = ny - first_j < lanes ? ny - first_j : lanes;
       for (std::int32_t lane = 0; lane < row_count; ++lane) {
         if (!(last[lane] >= first[lane])) continue;
         const auto from = static_cast<std::int32_t>(first[lane]);
@@ -302,10 +301,10 @@ PairScore score_pair(const SearchScene& scene, const std::array<CandidateBody, 2
   return HWY_DYNAMIC_DISPATCH(score_pair_kernel)(scene, pair, most_shared, work);
 }
 
-void raster_rows(const FloatBody& body, float edge, const CubeRange& range, std::int32_t ny, std::int32_t nz, std::int32_t words_per_row,
+void raster_rows(const FloatBody& body, float edge, std::int32_t nx, std::int32_t ny, std::int32_t nz, std::int32_t words_per_row,
                  std::uint32_t* rows, CountWork* work) {
   CountWork unused;
-  HWY_DYNAMIC_DISPATCH(raster_kernel)(body, edge, range, ny, nz, words_per_row, rows, work != nullptr ? *work : unused);
+  HWY_DYNAMIC_DISPATCH(raster_kernel)(body, edge, nx, ny, nz, words_per_row, rows, work != nullptr ? *work : unused);
 }
 
 void add_rows(const RowRange& rows, std::int32_t first_x, std::int32_t n, std::uint8_t* counts) {

@@ -8,14 +8,9 @@
 
 namespace colony::kernel {
 
-/// Of a raster's rows: those with first_y <= j < end_y, and of these the cubes first_x <= i < end_x.
-struct CubeRange {
-  std::int32_t first_x, end_x, first_y, end_y;
-};
-
-/// In that range, sets bit i % 32 of word i / 32 of row (k, j) where the point edge * (i, j, k) lies inside `body`. The rows, and a word beyond the last, must be
+/// Sets bit i % 32 of word i / 32 of row (k, j) where the point edge * (i, j, k) lies inside `body`. The rows, and a word beyond the last, must be
 /// there and 0 before. At most 2^31 bits in all.
-void raster_rows(const FloatBody& body, float edge, const CubeRange& range, std::int32_t ny, std::int32_t nz, std::int32_t words_per_row,
+void raster_rows(const FloatBody& body, float edge, std::int32_t nx, std::int32_t ny, std::int32_t nz, std::int32_t words_per_row,
                  std::uint32_t* rows, CountWork* work = nullptr);
 
 /// Rows (z, y, word) of a raster, of which those with first_y <= y < end_y count. Eight bytes beyond the last are readable.

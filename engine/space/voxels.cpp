@@ -21,9 +21,8 @@ std::int32_t cube_of(double coordinate_um, double edge_um) {
   return static_cast<std::int32_t>(truncated - (static_cast<double>(truncated) > quotient ? 1 : 0));
 }
 
-// Where the raster lies, and the body relative to the centre of its first cube: never of the first that is drawn, so that rounding does not
-// depend on the window.
-kernel::FloatBody frame_raster(const Body& body, double edge_um, const VoxelWindow& window, VoxelRaster& out) {
+// Where the raster lies, and the body relative to the centre of its first cube.
+kernel::FloatBody frame_raster(const Body& body, double edge_um, VoxelRaster& out) {
   const Box& box = body.box();
   out.x0 = cube_of(box.low.x(), edge_um);
   out.y0 = cube_of(box.low.y(), edge_um);
@@ -32,7 +31,6 @@ kernel::FloatBody frame_raster(const Body& body, double edge_um, const VoxelWind
   out.ny = cube_of(box.high.y(), edge_um) - out.y0 + 1;
   out.nz = cube_of(box.high.z(), edge_um) - out.z0 + 1;
   out.words_per_row = (out.nx + 31) / 32;
-  out.drawn = {std::max(out.x0, window.x0), std::min(out.x0 + out.nx, window.x1), std::max(out.y0, window.y0), std::min(out.y0 + out.ny, window.y1)};
   out.rows.assign(static_cast<std::size_t>(out.words_per_row) * static_cast<std::size_t>(out.ny) * static_cast<std::size_t>(out.nz) + 2, 0);
   return kernel::FloatBody(body, Vec3((out.x0 + 0.5) * edge_um, (out.y0 + 0.5) * edge_um, (out.z0 + 0.5) * edge_um));
 }
@@ -47,14 +45,13 @@ bool VoxelRaster::holds(std::int32_t x, std::int32_t y, std::int32_t z) const {
   return (rows[static_cast<std::size_t>((k * ny + j) * words_per_row + i / 32)] >> (i % 32)) & 1U;
 }
 
-void make_raster(const Body& body, double edge_um, VoxelRaster& out, kernel::CountWork* work, const VoxelWindow& window) {
-  const kernel::FloatBody relative = frame_raster(body, edge_um, window, out);
-  const kernel::CubeRange range = {out.drawn.x0 - out.x0, out.drawn.x1 - out.x0, out.drawn.y0 - out.y0, out.drawn.y1 - out.y0};
-  kernel::raster_rows(relative, static_cast<float>(edge_um), range, out.ny, out.nz, out.words_per_row, out.rows.data(), work);
+void make_raster(const Body& body, double edge_um, VoxelRaster& out, kernel::CountWork* work) {
+  const kernel::FloatBody relative = frame_raster(body, edge_um, out);
+  kernel::raster_rows(relative, static_cast<float>(edge_um), out.nx, out.ny, out.nz, out.words_per_row, out.rows.data(), work);
 }
 
 void make_raster_reference(const Body& body, double edge_um, VoxelRaster& out) {
-  const kernel::FloatBody relative = frame_raster(body, edge_um, kWholeDish, out);
+  const kernel::FloatBody relative = frame_raster(body, edge_um, out);
   const auto edge = static_cast<float>(edge_um);
   for (std::int32_t k = 0; k < out.nz; ++k) {
     for (std::int32_t j = 0; j < out.ny; ++j) {
@@ -66,7 +63,7 @@ void make_raster_reference(const Body& body, double edge_um, VoxelRaster& out) {
   }
 }
 
-const VoxelRaster& RasterCache::of(CellId id, const Body& body, kernel::CountWork& work, const VoxelWindow& window) {
+const VoxelRaster& RasterCache::of(CellId id, const Body& body, kernel::CountWork& work) {
   while (slots_.size() < kSlotsMax && slots_.size() < id.value) {
     std::vector<Slot> grown(std::max<std::size_t>(64, 2 * slots_.size()));
     for (Slot& slot : slots_) {
@@ -76,26 +73,14 @@ const VoxelRaster& RasterCache::of(CellId id, const Body& body, kernel::CountWor
   }
   Slot& slot = slots_[id.value % slots_.size()];
   const bool known = slot.id == id && slot.centre == body.centre_um() && slot.to_unit == body.to_unit() && slot.noise_offset == body.noise_offset();
-  const auto drawn = [&] {
-    const VoxelRaster& r = slot.raster;
-    const auto holds = [](std::int32_t low, std::int32_t high, std::int32_t whole, std::int32_t n, std::int32_t from, std::int32_t to) {
-      return low <= std::max(whole, from) && std::min(whole + n, to) <= high;
-    };
-    return holds(r.drawn.x0, r.drawn.x1, r.x0, r.nx, window.x0, window.x1) && holds(r.drawn.y0, r.drawn.y1, r.y0, r.ny, window.y0, window.y1);
-  };
-  if (++asked_count_ == kRemembered) {
-    asked_count_ /= 2;
-    made_count_ /= 2;
-  }
-  if (!known || !drawn()) {
-    ++made_count_;
+  if (!known) {
     slot.id = id;
     slot.centre = body.centre_um();
     slot.to_unit = body.to_unit();
     slot.noise_offset = body.noise_offset();
     const auto bytes_of = [](const VoxelRaster& raster) { return raster.rows.capacity() * sizeof(std::uint32_t); };
     bytes_ -= bytes_of(slot.raster);
-    make_raster(body, edge_um_, slot.raster, &work, known ? kWholeDish : window);
+    make_raster(body, edge_um_, slot.raster, &work);
     bytes_ += bytes_of(slot.raster);
     if (bytes_ > kBytesMax) {
       for (Slot& other : slots_) {
@@ -127,18 +112,11 @@ void VoxelCounts::centre_on(const Vec3& pivot_um) {
   std::memset(counts_.data(), 0, counts_.size());
 }
 
-VoxelWindow VoxelCounts::window(const Vec3& pivot_um, double reach_um) const {
-  // A cube to each side for rounding; half of one beyond the points is asked anyway.
-  const auto low = [&](double at) { return cube_of(at - reach_um, edge_um_) - 1; };
-  const auto high = [&](double at) { return cube_of(at + reach_um, edge_um_) + 2; };
-  return {low(pivot_um.x()), high(pivot_um.x()), low(pivot_um.y()), high(pivot_um.y())};
-}
-
 void VoxelCounts::add(const VoxelRaster& raster) {
   const std::int32_t first_y = raster.y0 - y0_;
   CHECK(raster.z0 >= 0 && raster.z0 + raster.nz < nz_);
-  const kernel::RowRange rows{raster.rows.data(), raster.words_per_row, raster.ny, raster.nz, std::max(raster.drawn.y0 - raster.y0, -first_y),
-                              std::min(raster.drawn.y1 - raster.y0, n_ - first_y), first_y};
+  const kernel::RowRange rows{raster.rows.data(), raster.words_per_row, raster.ny, raster.nz, std::max(0, -first_y), std::min(raster.ny, n_ - first_y),
+                              first_y};
   if (rows.first_y >= rows.end_y) return;
   kernel::add_rows(rows, raster.x0 - x0_, n_, counts_.data() + raster.z0 * n_ * n_);
 }

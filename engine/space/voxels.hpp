@@ -21,25 +21,16 @@
 
 namespace colony {
 
-/// Cubes x0 <= x < x1, y0 <= y < y1 of any height, in edges from the origin of the dish.
-struct VoxelWindow {
-  std::int32_t x0, x1, y0, y1;
-};
-/// Everything: no body reaches as far.
-inline constexpr VoxelWindow kWholeDish = {-2'000'000'000, 2'000'000'000, -2'000'000'000, 2'000'000'000};
-
 /// The cubes a body covers: rows along x, bit i of a row's words is cube x0 + i.
 struct VoxelRaster {
   std::int32_t x0 = 0, y0 = 0, z0 = 0;   // in edges from the origin of the dish
   std::int32_t nx = 0, ny = 0, nz = 0;
   std::int32_t words_per_row = 0;
-  VoxelWindow drawn = {0, 0, 0, 0};      // within [x0, x0 + nx) x [y0, y0 + ny): the part that was asked for; elsewhere all bits are 0
   std::vector<std::uint32_t> rows;       // (z, y, word); two words to spare
   bool holds(std::int32_t x, std::int32_t y, std::int32_t z) const;
 };
 
-/// Whether a cube is covered does not depend on the window.
-void make_raster(const Body& body, double edge_um, VoxelRaster& out, kernel::CountWork* work = nullptr, const VoxelWindow& window = kWholeDish);
+void make_raster(const Body& body, double edge_um, VoxelRaster& out, kernel::CountWork* work = nullptr);
 /// The brute-force twin, cube by cube.
 void make_raster_reference(const Body& body, double edge_um, VoxelRaster& out);
 
@@ -47,14 +38,10 @@ void make_raster_reference(const Body& body, double edge_um, VoxelRaster& out);
 class RasterCache {
  public:
   explicit RasterCache(double edge_um) : edge_um_(edge_um) {}
-  /// Drawn at least in `window`. Valid until the next call. Adds the evaluations it took to `work`. The first time only
-  /// what was asked for is drawn; if more is wanted later, all of it.
-  const VoxelRaster& of(CellId id, const Body& body, kernel::CountWork& work, const VoxelWindow& window = kWholeDish);
-  /// Of late a quarter of those asked for had to be drawn.
-  bool misses_often() const { return 4 * made_count_ > asked_count_; }
+  /// Valid until the next call. Adds the evaluations it took to `work`.
+  const VoxelRaster& of(CellId id, const Body& body, kernel::CountWork& work);
 
  private:
-  static constexpr std::uint32_t kRemembered = 4096;
   struct Slot {
     CellId id;                           // 0: empty
     Vec3 centre = Vec3::Zero();
@@ -67,7 +54,6 @@ class RasterCache {
 
   double edge_um_;
   std::size_t bytes_ = 0;                // of the rasters kept
-  std::uint32_t asked_count_ = 0, made_count_ = 0;   // halved at kRemembered
   std::vector<Slot> slots_;              // grows by doubling up to kSlotsMax; slot = id modulo size
 };
 
@@ -79,8 +65,6 @@ class VoxelCounts {
 
   /// Empties it and moves it over `pivot_um`.
   void centre_on(const Vec3& pivot_um);
-  /// The cubes in which points no further than that from the pivot along x and y are looked up, and some more.
-  VoxelWindow window(const Vec3& pivot_um, double reach_um) const;
   void add(const VoxelRaster& raster);
 
   double edge_um() const { return edge_um_; }

@@ -179,62 +179,6 @@ TEST(RasterCache, NeverServesABodyThatHasMovedOrDivided) {
   EXPECT_GT(kept, 100);
 }
 
-TEST(RasterCache, ServesAtLeastTheWindowAndInItTheSameCubes) {
-  const double edge_um = voxel_edge_um(Params{});
-  Stream stream = testing::case_stream(2);
-  std::uint64_t cubes = 0, left_out = 0;
-  int part = 0, whole_later = 0;
-  for (int number = 0; number < testing::scaled(300, 3000); ++number) {
-    RasterCache cache(edge_um);
-    const Body body(testing::spread_cell(stream, 0.0, 0.0, 900.0), testing::rough());
-    VoxelRaster whole;
-    make_raster(body, edge_um, whole);
-    for (int ask = 0; ask < 3; ++ask) {
-      const auto side = [&](std::int32_t from, std::int32_t n) { return from - 3 + static_cast<std::int32_t>(stream.below(static_cast<std::uint32_t>(n) + 6)); };
-      VoxelWindow window = {side(whole.x0, whole.nx), 0, side(whole.y0, whole.ny), 0};
-      window.x1 = window.x0 + 1 + static_cast<std::int32_t>(stream.below(30));
-      window.y1 = window.y0 + 1 + static_cast<std::int32_t>(stream.below(30));
-      kernel::CountWork work;
-      testing::on_every_target([&](const std::string& name) {
-        RasterCache fresh(edge_um);
-        for (const VoxelRaster* found : {&cache.of(CellId{7}, body, work, window), &fresh.of(CellId{7}, body, work, window)}) {
-          for (std::int32_t z = whole.z0; z < whole.z0 + whole.nz; ++z) {
-            for (std::int32_t y = std::max(window.y0, whole.y0); y < std::min(window.y1, whole.y0 + whole.ny); ++y) {
-              for (std::int32_t x = std::max(window.x0, whole.x0); x < std::min(window.x1, whole.x0 + whole.nx); ++x) {
-                ASSERT_EQ(found->holds(x, y, z), whole.holds(x, y, z)) << name << " case " << number << " ask " << ask;
-                ++cubes;
-              }
-            }
-          }
-        }
-        left_out += fresh.of(CellId{7}, body, work, window).rows != whole.rows ? 1 : 0;
-      }, false);
-      if (HasFatalFailure()) return;
-      const bool all = equal(cache.of(CellId{7}, body, work, window), whole);
-      (all ? whole_later : part) += 1;
-    }
-  }
-  EXPECT_GT(cubes, 100'000U);
-  EXPECT_GT(left_out, 100U);
-  EXPECT_GT(part, 50);
-  EXPECT_GT(whole_later, 50);
-}
-
-TEST(VoxelCounts, WindowHoldsEveryCubeThatIsLookedUp) {
-  VoxelCounts voxels(Params{});
-  const double edge_um = voxels.edge_um();
-  for (std::uint32_t number = 1; number <= 500; ++number) {
-    Stream stream = testing::case_stream(number);
-    const Vec3 pivot(stream.uniform({-5000, 5000}), stream.uniform({-5000, 5000}), 2.0);
-    const double reach_um = stream.uniform({1.0, 25.0});
-    const VoxelWindow window = voxels.window(pivot, reach_um);
-    EXPECT_LT(window.x0, std::floor((pivot.x() - reach_um) / edge_um));
-    EXPECT_GT(window.x1 - 1, std::floor((pivot.x() + reach_um) / edge_um));
-    EXPECT_LT(window.y0, std::floor((pivot.y() - reach_um) / edge_um));
-    EXPECT_GT(window.y1 - 1, std::floor((pivot.y() + reach_um) / edge_um));
-  }
-}
-
 const testing::Run& crowded() {
   static const testing::Run run = testing::run(testing::spec_of(3, 120));
   return run;
