@@ -9,6 +9,8 @@ namespace colony::server::http {
 
 using Io = Connection::Io;
 
+constexpr std::string_view kNothing;
+
 // Stands between a source, which may wake whenever it likes and from any thread, and a session that may have ended.
 // Calls that come before the session has looked are one call.
 class Session::Waker {
@@ -85,7 +87,6 @@ Awaitable<bool> Session::send_stream(Framing framing) {
   for (;;) {
     // Before the pull: a wake that comes while it runs must lead to another one.
     woken_ = false;
-    std::string().swap(piece_);  // a thousand streams that wait hold a thousand of what stays here
     if (is_first || !pull_what_is_ready()) {
       auto task = as_worker_task([this, is_first] { pull_stream(is_first); });
       shared_.workers.submit_pull(std::move(task));
@@ -99,9 +100,10 @@ Awaitable<bool> Session::send_stream(Framing framing) {
     }
 
     const bool is_silent_pull = piece_.empty() && !shared_piece_;
-    bool is_sent =
-        co_await send_piece(framing, shared_piece_ ? std::string_view(*shared_piece_) : std::string_view(), piece_);
+    const std::string_view shared = shared_piece_ ? std::string_view(*shared_piece_) : kNothing;
+    bool is_sent = co_await send_piece(framing, shared, piece_);
     shared_piece_.reset();
+    std::string().swap(piece_);  // a thousand streams that wait hold a thousand of what stays here
     if (!is_sent) co_return false;
     if (*pulled_ == BodySource::Pull::kEnd) break;
     if (!is_silent_pull) silent_since = Connection::Clock::now();
@@ -115,13 +117,13 @@ Awaitable<bool> Session::send_stream(Framing framing) {
       if (closing_ || connection_->peer_has_closed()) co_return false;
       const bool is_silent = !woken_ && !(draining_ && !farewell.empty());
       if (is_silent && Connection::Clock::now() >= silent_since + silence_max) {
-        is_sent = co_await send_piece(framing, {}, response_.stream->keep_alive());
+        is_sent = co_await send_piece(framing, kNothing, response_.stream->keep_alive());
         if (!is_sent) co_return false;
         silent_since = Connection::Clock::now();
       }
     }
     if (draining_ && !farewell.empty()) {
-      is_sent = co_await send_piece(framing, {}, farewell);
+      is_sent = co_await send_piece(framing, kNothing, farewell);
       if (!is_sent) co_return false;
       keep_alive_ = false;
       break;
