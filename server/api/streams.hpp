@@ -104,6 +104,7 @@ class EventStream : public http::BodySource {
 
  private:
   Pull pull_stored(std::string& out);
+  void let_go_of_page();
   Pull say(std::string& out, const WatchedJob& job, bool has_more);
   void append_progress(std::string& out, const WatchedJob& job, bool is_last);
 

@@ -1,17 +1,26 @@
 #include "tests/bench/load_jobs.hpp"
 
-#include <atomic>
 #include <stdexcept>
-#include <thread>
 
 #include "server/api/codec_spec.hpp"
+#include "server/store/connection.hpp"
 #include "server/store/store.hpp"
 
 namespace colony::bench {
 namespace {
 
-constexpr std::size_t kWriters = 128;  // who waits for a commit shares it
-constexpr std::size_t kPaused = 100, kVerify = 100, kNames = 100, kBatches = 1000;
+// Rows are copies of one that the store has made: a hundred thousand submissions would take longer than all else.
+// i is 0 for the oldest.
+constexpr const char* kCopies = R"sql(
+WITH RECURSIVE number(i) AS (SELECT 0 UNION ALL SELECT i + 1 FROM number WHERE i + 1 < COUNT)
+INSERT INTO job (id, kind, name, state, reason, detail, submitted_by, created_at, revision, last_seq, digest, engine_version, spec,
+    until_time_h, until_cells, time_h, cell_count, active_count, passive_count, senescent_count)
+  SELECT printf('01a00000-0000-7000-8000-%012d', i), iif(i BETWEEN 100 AND 199, 'verify', kind), 'colony ' || (i % 100),
+      iif(i < 100, 'paused', state), iif(i < 100, 'user', reason), detail, submitted_by, created_at, revision, last_seq, digest,
+      engine_version, spec, until_time_h, until_cells, time_h, cell_count, active_count, passive_count, senescent_count
+    FROM number, (SELECT * FROM job) AS sample;
+INSERT INTO label SELECT job_key, 'project', 'bench' FROM job UNION ALL SELECT job_key, 'batch', job_key % 1000 FROM job;
+)sql";
 
 template <class Value>
 Value expect(Result<Value> result) {
@@ -24,31 +33,19 @@ Value expect(Result<Value> result) {
 std::vector<std::pair<std::string, std::string>> make_jobs(const std::string& data, std::size_t count) {
   server::StoreConfig config;
   config.data_dir = data;
-  const auto store = expect(server::Store::open(config));
-  const auto body = server::api::parse_json(R"({"until": {"cells": 1000}, "model": {"cycle": {"mean_h": 14}}})");
-  const auto spec = expect(server::api::decode_spec(*body, server::api::SpecLimits{}));
-  const server::NewJob sample = server::api::new_job(spec);
-  const auto make = [&](std::size_t i) {
-    server::NewJob job = sample;
-    job.name = "colony " + std::to_string(i % kNames);
-    job.labels = {{"project", "bench"}, {"batch", std::to_string(i % kBatches)}};
-    if (i >= kPaused && i < kPaused + kVerify) job.kind = "verify";
-    const auto made = expect(store->create_job(job, count));
-    (void)expect(
-        store->command_job(made.job.job_key, i < kPaused ? server::JobCommand::kPause : server::JobCommand::kCancel));
-  };
-  // The oldest ones in their order; then in that of whoever comes first.
-  const std::size_t ordered = kPaused + kVerify;
-  for (std::size_t i = 0; i < ordered; ++i) make(i);
-  std::atomic<std::size_t> next{ordered};
-  std::vector<std::thread> writers;
-  for (std::size_t k = 0; k < kWriters; ++k) {
-    writers.emplace_back([&] {
-      for (std::size_t i; (i = next++) < count;) make(i);
-    });
+  {
+    const auto store = expect(server::Store::open(config));
+    const auto body = server::api::parse_json(R"({"until": {"cells": 1000}, "model": {"cycle": {"mean_h": 14}}})");
+    const auto spec = expect(server::api::decode_spec(*body, server::api::SpecLimits{}));
+    const auto made = expect(store->create_job(server::api::new_job(spec), 1));
+    (void)expect(store->command_job(made.job.job_key, server::JobCommand::kCancel));
   }
-  for (std::thread& writer : writers) writer.join();
-
+  {
+    std::string sql = kCopies;
+    sql.replace(sql.find("COUNT"), 5, std::to_string(count));
+    server::Connection(data + "/colony.db", server::Connection::Access::kWriter).execute(sql);
+  }
+  const auto store = expect(server::Store::open(config));
   std::string middle;
   for (std::size_t passed = 0; passed < count / 2;) {
     const auto page = expect(store->list_jobs({}, 1000, middle));
