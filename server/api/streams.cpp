@@ -218,7 +218,8 @@ http::BodySource::Pull EventStream::pull_stored(std::string& out) {
     // A page that is not full is all there was when it was read. If that was now, after the state, nothing more need be asked: what comes
     // later wakes. If it was in an earlier pull, whose piece was full, the job may have gone on and even ended since.
     const bool is_last_page = is_fresh && page_.size() < kEventsPerRead;
-    for (; next_ < page_.size() && out.size() < kPieceBytes; ++next_) {
+    const std::size_t size_before = out.size();
+    for (; next_ < page_.size() && out.size() - size_before < kPieceBytes; ++next_) {
       append_event_message(out, page_[next_]);
       wish_.filter.after = page_[next_].seq;
     }

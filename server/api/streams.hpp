@@ -1,6 +1,6 @@
 // streams: answers that are made piece by piece, so that their length costs no memory.
-// Promise: events are read from the store in pages by seq, or once for all watchers (feed.hpp); no database transaction is held across a wait. A live stream
-//          gives every event of its filter exactly once and in order; progress at most 5 times a second, but a
+// Promise: events are read from the store in pages by seq, or once for all watchers (feed.hpp); no database transaction is
+//          held across a wait. A live stream gives every event of its filter exactly once and in order; progress at most 5 times a second, but a
 //          change of state at once, and the latest progress within 200 ms, also if nothing happens after it.
 // Errors:  a failure after the first piece throws: the session cuts the connection without the last chunk, so that the
 //          reader sees a truncated body, never a short one that looks whole.

@@ -14,6 +14,7 @@
 
 #include "server/api/streams.hpp"
 #include "server/jobs/live.hpp"
+#include "tests/support/scale.hpp"
 #include "tests/unit/api_support.hpp"
 
 namespace colony::server::testing {
@@ -124,7 +125,8 @@ api::StreamWish wish_of(std::uint64_t after, std::vector<EventKind> kinds = {}) 
 TEST(Feed, GivesEveryEventOnceWhereverItMeetsTheStore) {
   std::mt19937 random(7);
   const auto up_to = [&random](std::size_t end) { return random() % (end + 1); };
-  for (int round = 0; round < 20; ++round) {
+  const int rounds = colony::testing::scaled(4, 40);
+  for (int round = 0; round < rounds; ++round) {
     GrowingJobs jobs(1500);
     api::Feeds feeds(jobs, api::Feeds::Mode::kByHand);
     std::vector<Reader> readers;
