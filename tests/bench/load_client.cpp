@@ -57,18 +57,21 @@ class Client {
     parser_->body_limit(kAnswerBytesMax);
     beast::http::async_read(socket_, buffer_, *parser_, [this](error_code error, std::size_t) {
       if (error) fail("no answer: " + error.message());
-      if (parser_->get().result_int() != 200) {
+      was_refused_ = parser_->get().result_int() == 503;
+      if (parser_->get().result_int() != 200 && !was_refused_) {
         fail("the answer is " + std::to_string(parser_->get().result_int()) + ": " + parser_->get().body());
       }
       on_answer_();
     });
   }
+  bool was_refused() const { return was_refused_; }
 
  private:
   tcp::socket socket_;
   beast::flat_buffer buffer_;
   std::optional<beast::http::response_parser<beast::http::string_body>> parser_;
   std::function<void()> on_answer_;
+  bool was_refused_ = false;
 };
 
 }  // namespace
@@ -98,6 +101,7 @@ Latencies closed_loop(std::uint16_t port, const std::string& request, std::size_
     clients.push_back(std::make_unique<Client>(io, port));
     again[i] = [&, i] {
       const auto now = Clock::now();
+      if (clients[i]->was_refused()) fail("the server is busy");
       out.all_ms.push_back(milliseconds(now - asked[i]));
       if (now >= end) return;
       asked[i] = now;
@@ -130,8 +134,10 @@ Latencies open_loop(std::uint16_t port, const std::function<const std::string&(s
   std::function<void(error_code)> tick = [&](error_code) {
     for (; sent < count && due(sent) <= Clock::now(); ++sent) {
       if (idle.empty()) {
-        if (clients.size() >= kOpenConnectionsMax)
-          fail("the server does not keep up: all connections wait for an answer");
+        if (clients.size() >= kOpenConnectionsMax) {
+          ++out.refused;
+          continue;
+        }
         clients.push_back(std::make_unique<Client>(io, port));
         idle.push_back(clients.back().get());
       }
@@ -139,6 +145,7 @@ Latencies open_loop(std::uint16_t port, const std::function<const std::string&(s
       idle.pop_back();
       client->ask(next(sent), [&, client, at = due(sent)] {
         out.all_ms.push_back(milliseconds(Clock::now() - at));
+        out.refused += client->was_refused();
         idle.push_back(client);
       });
     }

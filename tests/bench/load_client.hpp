@@ -1,6 +1,6 @@
 // load_client: many keep-alive connections to one server, asked as fast as it answers or at a given rate.
 // Method:  one thread, Asio callbacks, Beast's parser; the requests are texts made beforehand.
-// Errors:  std::runtime_error for a connection that fails and for an answer that is not 200.
+// Errors:  std::runtime_error for a connection that fails and for an answer that is neither 200 nor counted as refused.
 #pragma once
 
 #include <cstdint>
@@ -12,6 +12,7 @@ namespace colony::bench {
 
 struct Latencies {
   std::vector<double> all_ms;  // of every answer, in the order in which they came
+  std::uint64_t refused = 0;   // answered 503, or not sent because too many waited; open loop alone
   double wall_s = 0.0;
   double cpu_s = 0.0;  // of the client
 
