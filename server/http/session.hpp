@@ -1,7 +1,7 @@
 // session: the requests of one connection, one after the other: gate, admission, body, router, answer.
-// Promises that nothing of a handler or a stream runs on an I/O thread but what is in memory already (pull_now); that every request is answered in order, or the
-//          connection is closed; that a stream holds a worker only while it is pulled, and is never pulled while its
-//          last piece is still being sent; and that it ends soon after close().
+// Promises that nothing of a handler or a stream runs on an I/O thread but what is in memory already (pull_now); that every
+//          request is answered in order, or the connection is closed; that a stream holds a worker only while it is
+//          pulled, and is never pulled while its last piece is still being sent; and that it ends soon after close().
 // Does not keep a connection after a refusal: where the next request begins is then a matter of trust.
 // Threads: start, drain and close from any thread; everything else on the connection's strand, but for the tasks of
 //          workers, which touch request_, response_ and piece_ while the session waits for them.

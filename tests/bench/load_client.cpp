@@ -134,7 +134,7 @@ Latencies open_loop(std::uint16_t port, const std::function<const std::string&(s
   std::function<void(error_code)> tick = [&](error_code) {
     for (; sent < count && due(sent) <= Clock::now(); ++sent) {
       if (idle.empty()) {
-        if (clients.size() >= kOpenConnectionsMax) {
+        if (clients.size() - out.refused >= kOpenConnectionsMax) {
           ++out.refused;
           continue;
         }
@@ -145,8 +145,11 @@ Latencies open_loop(std::uint16_t port, const std::function<const std::string&(s
       idle.pop_back();
       client->ask(next(sent), [&, client, at = due(sent)] {
         out.all_ms.push_back(milliseconds(Clock::now() - at));
-        out.refused += client->was_refused();
-        idle.push_back(client);
+        if (client->was_refused()) {
+          ++out.refused;  // and the server has closed the connection
+        } else {
+          idle.push_back(client);
+        }
       });
     }
     if (sent == count) return;
