@@ -8,6 +8,7 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -55,6 +56,9 @@ inline constexpr std::uint32_t kPackingPoints = 1024;               // a cell's 
 /// Placing more founders than this can take long: one submission at a time may.
 inline constexpr std::uint64_t kFoundersPlacedFreely = 1000;
 
+class Feeds;
+class JobTexts;
+
 /// What handlers work with.
 struct Context {
   JobService& jobs;
@@ -64,6 +68,9 @@ struct Context {
   std::string openapi_text;
   std::atomic<bool> places_many{false};  // a submission of many founders is being checked
   std::unique_ptr<AnalysisWorker> worker = {};  // from start() on
+  // Not shared: a unique_ptr would have to know the class here.
+  std::shared_ptr<JobTexts> job_texts = {};  // answers of GET, kept
+  std::shared_ptr<Feeds> feeds = {};         // of the streams, which all end before it
 };
 
 /// A request that has passed the table's checks.
@@ -114,6 +121,9 @@ class Api {
 /// Runs one endpoint: query, Accept and Content-Type first, then its handler. A handler that the end of the server
 /// stopped is answered with 503.
 http::Response run_endpoint(const Endpoint& endpoint, Context& context, const http::Request& request);
+
+/// The answer of an endpoint that is known without asking a store; nullopt: run it. For an I/O thread.
+std::optional<http::Response> answer_now(const Endpoint& endpoint, Context& context, const http::Request& request);
 
 http::Response json_response(int status, const Json& body);
 http::Response failure(const Error& error, const Call& call);

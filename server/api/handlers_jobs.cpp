@@ -6,6 +6,7 @@
 #include "server/api/api.hpp"
 #include "server/api/codec_event.hpp"
 #include "server/api/estimate.hpp"
+#include "server/api/job_texts.hpp"
 
 namespace colony::server::api {
 namespace {
@@ -153,10 +154,14 @@ http::Response get_jobs(Context& context, const Call& call) {
   }
   const auto page = context.jobs.list(filter, limit, cursor.value_or(""));
   if (!page) return failure(page.error(), call);
-  Json items = Json::array();
-  for (const JobView& view : page->items) items.push_back(encode_job(view));
-  http::Response response =
-      json_response(200, {{"items", std::move(items)}, {"next", page->next ? Json(*page->next) : Json(nullptr)}});
+  http::Response response;
+  response.headers.set("Content-Type", "application/json");
+  response.body = "{\"items\":[";
+  for (const JobView& view : page->items) {
+    if (&view != &page->items.front()) response.body += ',';
+    append_job_text(response.body, view);
+  }
+  response.body += "],\"next\":" + to_text(page->next ? Json(*page->next) : Json(nullptr)) + "}";
   if (page->next) {
     std::string target = context.config.base_path + "/v1/jobs?";
     for (const auto& [name, value] : call.request.query) {
@@ -176,8 +181,8 @@ http::Response get_job_counts(Context& context, const Call& call) {
 }
 
 http::Response get_job(Context& context, const Call& call) {
-  const auto view = context.jobs.show(call.id());
-  return view ? json_response(200, encode_job(*view)) : failure(view.error(), call);
+  const auto text = context.job_texts->read(call.id());
+  return text ? job_answer(**text) : failure(text.error(), call);
 }
 
 http::Response cancel_job(Context& context, const Call& call) { return command(context, call, &JobService::cancel); }

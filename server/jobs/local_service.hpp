@@ -29,6 +29,7 @@ class LocalJobService final : public JobService {
 
   Result<Submitted> submit(const NewJob& job) override;
   Result<JobView> show(const std::string& id) override;
+  std::uint64_t commit_count() const override { return store_.commit_count(); }
   Result<Page> list(const JobFilter& filter, std::size_t limit, const std::string& cursor) override;
   Result<std::vector<std::uint64_t>> counts() override;
 

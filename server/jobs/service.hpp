@@ -28,6 +28,7 @@ struct JobsConfig {
   std::uint64_t cached_cells_max = 2'000'000;  // and the cells of them all; a larger colony is served but not kept
   std::int64_t command_wait_ms = 1'000;    // how long cancel and pause wait for the runner; then the view as it is
   std::int64_t storage_retry_ms = 1'000;   // first pause after a storage error; doubles up to 64 times this
+  std::uint64_t events_per_s_max = 0;      // of each job: it waits rather than be faster. 0: as fast as it decides
   std::uint64_t free_bytes_min = 16'777'216;   // a job stopped by the disk goes on only with this much free
 };
 
@@ -71,6 +72,9 @@ class JobService {
   struct Submitted { JobView view; bool created = true; };
   virtual Result<Submitted> submit(const NewJob& job) = 0;
   virtual Result<JobView> show(const std::string& id) = 0;
+  /// As Store::commit_count. But for rates, which are of the moment, and a job that the store has stopped and could not say so, a view is
+  /// as it was while this number stands.
+  virtual std::uint64_t commit_count() const = 0;
   struct Page { std::vector<JobView> items; std::optional<std::string> next; };
   virtual Result<Page> list(const JobFilter& filter, std::size_t limit, const std::string& cursor) = 0;
   virtual Result<std::vector<std::uint64_t>> counts() = 0;

@@ -34,6 +34,7 @@ class SqliteStore final : public Store {
   Result<std::vector<JobRow>> running_jobs() override;
 
   void append_events(EventBatch batch, std::function<void(const Status&)> committed) override;
+  std::uint64_t commit_count() const override { return writer_->commit_count(); }
   Status flush() override;
   Result<std::vector<Event>> read_events(std::int64_t job_key, const EventFilter& filter, std::size_t limit) override;
   Result<std::uint64_t> seq_at(std::int64_t job_key, double at_h) override;

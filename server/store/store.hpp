@@ -99,6 +99,9 @@ class Store {
   /// (or with the error: then nothing of this batch was stored); it must not call the store. Batches of a job commit in the
   /// order given; after a failed one the later ones fail too (kConflict), because seq stays dense. Only of running jobs.
   virtual void append_events(EventBatch batch, std::function<void(const Status&)> committed) = 0;
+  /// Grows with every commit, before whoever waits for it or is told of it hears. While it stands, every reading is the same as one made
+  /// after it was last asked for.
+  virtual std::uint64_t commit_count() const = 0;
   /// Waits until everything queued before is committed.
   virtual Status flush() = 0;
   /// Up to `limit` events by ascending seq. Complete: placement and woken rows joined.

@@ -106,6 +106,7 @@ class FailingStore final : public server::Store {
   }
   Status delete_job(std::int64_t job_key) override { return real_->delete_job(job_key); }
   Result<std::vector<JobRow>> running_jobs() override { return real_->running_jobs(); }
+  std::uint64_t commit_count() const override { return real_->commit_count(); }
   Status flush() override { return real_->flush(); }
   server::AnalysisStore& analyses() override { return real_->analyses(); }
   Result<std::vector<Event>> read_events(std::int64_t job_key, const server::EventFilter& filter,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 #include <cstdlib>
 #include <filesystem>
 #include <map>
@@ -61,7 +62,13 @@ class FakeJobs : public JobService {
   JobFilter asked_filter;
   std::size_t asked_limit = 0;
 
-  JobView view() const { return {row, progress}; }
+  /// last_seq is that of the last event visible.
+  JobView view() const {
+    JobView view{row, progress};
+    const std::size_t visible = std::min(stored, history.size());
+    view.job.last_seq = view.progress.last_seq = visible == 0 ? 0 : history[visible - 1].seq;
+    return view;
+  }
   Status start() override { return Ok{}; }
   void drain() override {}
   Result<Submitted> submit(const NewJob& job) override {
@@ -79,6 +86,10 @@ class FakeJobs : public JobService {
     if (id != row.id) return missing(id);
     return view();
   }
+  /// Tests change the row without a commit: nothing that was read stands.
+  std::uint64_t commit_count() const override { return does_commit ? ++commits : commits.load(); }
+  mutable std::atomic<std::uint64_t> commits{0};
+  bool does_commit = true;
   Result<Page> list(const JobFilter& filter, std::size_t limit, const std::string& cursor) override {
     asked_filter = filter;
     asked_limit = limit;
