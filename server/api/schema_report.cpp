@@ -172,7 +172,6 @@ Json report_components() {
                           {"r2", number()},
                           {"range_px", {{"type", "array"}, {"items", count()}, {"minItems", 2}, {"maxItems", 2}}}})},
           {"MeasuredLine", line_schema()},
-          {"Report", strict_object(report_properties())},
           {"JobAnalysis", strict_object(std::move(job))},
           {"ImageMetadata", metadata_schema()},
           {"Segmentation", segmentation_schema()}};
