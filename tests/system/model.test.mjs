@@ -9,14 +9,14 @@ import { Model, World, steps } from './model/commands.mjs';
 
 const seeds = process.env.FUZZ_SEED ? [Number(process.env.FUZZ_SEED)]
   : full ? Array.from({ length: 40 }, (_, k) => (Date.now() + 7919 * k) % 2 ** 31) : [1, 2, 3];
-const length = full ? 300 : 90;
+const length = full ? 300 : 60;
 
 test('commands at random, with restarts', async (t) => {
   const sum = {};
   for (const seed of seeds) {
     await t.test(`FUZZ_SEED=${seed}`, async (t) => {
       // One run of many commands: shrinking it would start many servers, and what has been printed says what led to the fault.
-      await fc.assert(fc.asyncProperty(fc.commands(steps, { maxCommands: length, size: 'max' }), async (commands) => {
+      await fc.assert(fc.asyncProperty(fc.array(fc.oneof(...steps), { minLength: length, maxLength: length }), async (commands) => {
         const world = await new World(temporaryFolder(t)).start();
         const model = new Model();
         try {
@@ -30,5 +30,6 @@ test('commands at random, with restarts', async (t) => {
     });
   }
   t.diagnostic(`figure: model test: ${seeds.length} seeds; ${Object.entries(sum).map(([name, count]) => `${count} ${name}`).join(', ')}`);
+  if (process.env.FUZZ_SEED) return;
   for (const name of ['submit', 'submit, killed meanwhile', 'cancel', 'pause', 'resume', 'delete', 'list', 'events', 'kill -9', 'SIGTERM']) assert.ok(sum[name] > 0, `${name} was never tried`);
 });

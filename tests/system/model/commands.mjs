@@ -83,10 +83,11 @@ const submit = fc.tuple(specs, fc.option(keys, { nil: undefined })).map(([spec, 
 }, false, `${JSON.stringify(spec)}, ${key}`));
 
 /** Killed while the submission is on its way: it may or may not have been taken; asked again it is there once. */
-const submitKilled = specs.map((spec) => new Step('submit, killed meanwhile', async (model, world) => {
+const submitKilled = fc.tuple(specs, fc.nat({ max: 6 })).map(([spec, wait_ms]) => new Step('submit, killed meanwhile', async (model, world) => {
   const key = `killed ${model.jobs.length + model.gone.length} ${model.done['submit, killed meanwhile'] ?? 0}`;
   const lost = world.server.post('/v1/jobs', spec, headersOf(key)).catch(() => undefined);
-  await new Promise((go) => { setImmediate(go); });
+  // Any moment is right; these are spread over what a submission takes.
+  await new Promise((go) => { setTimeout(go, wait_ms); });
   await world.restart(true);
   const first = await lost;
   const again = await world.server.post('/v1/jobs', spec, headersOf(key));
@@ -95,7 +96,7 @@ const submitKilled = specs.map((spec) => new Step('submit, killed meanwhile', as
   const job = model.add(again.json.id, spec);
   job.seen(again.json);
   model.keys.set(key, job);
-}, false, JSON.stringify(spec)));
+}, false, `${JSON.stringify(spec)}, ${wait_ms} ms`));
 
 const onJob = (name, does) => fc.nat().map((n) => new Step(name, (model, world) => does(model, world, model.pick(n)), true, n));
 
