@@ -11,15 +11,17 @@ const understood = new Set(['type', 'enum', 'const', 'minimum', 'maximum', 'excl
 function integer({ minimum = -1e6, maximum = 1e6, exclusiveMinimum, exclusiveMaximum }) {
   const min = Math.max(Math.ceil(minimum), exclusiveMinimum === undefined ? -Infinity : Math.floor(exclusiveMinimum) + 1);
   const max = Math.min(Math.floor(maximum), exclusiveMaximum === undefined ? Infinity : Math.ceil(exclusiveMaximum) - 1);
-  return fc.oneof({ weight: 1, arbitrary: fc.constantFrom(min, max) }, { weight: 3, arbitrary: fc.maxSafeInteger().map((n) => min + Math.abs(n) % (Math.min(max, min + 1000) - min + 1)) },
-    { weight: 1, arbitrary: fc.maxSafeInteger().map((n) => min + Math.abs(n) % (max - min + 1)).filter((n) => n <= max) });
+  return fc.oneof({ weight: 1, arbitrary: fc.constantFrom(min, max) }, { weight: 3, arbitrary: fc.integer({ min, max: Math.min(max, min + 1000) }) },
+    { weight: 1, arbitrary: fc.integer({ min, max }) });
 }
 
 function number({ minimum, maximum, exclusiveMinimum, exclusiveMaximum }) {
   const min = exclusiveMinimum ?? minimum ?? -1e9;
   const max = exclusiveMaximum ?? maximum ?? 1e9;
-  return fc.oneof({ weight: 3, arbitrary: fc.double({ min, max, minExcluded: exclusiveMinimum !== undefined, maxExcluded: exclusiveMaximum !== undefined, noNaN: true }) },
-    { weight: 2, arbitrary: fc.integer({ min: Math.ceil(min), max: Math.max(Math.ceil(min), Math.floor(Math.min(max, min + 100))) }).filter((n) => n <= max && (n > min || exclusiveMinimum === undefined)) });
+  const doubles = fc.double({ min, max, minExcluded: exclusiveMinimum !== undefined, maxExcluded: exclusiveMaximum !== undefined, noNaN: true });
+  const least = exclusiveMinimum === undefined ? Math.ceil(min) : Math.floor(min) + 1;
+  const most = Math.min(exclusiveMaximum === undefined ? Math.floor(max) : Math.ceil(max) - 1, least + 100);
+  return least > most ? doubles : fc.oneof({ weight: 3, arbitrary: doubles }, { weight: 2, arbitrary: fc.integer({ min: least, max: most }) });
 }
 
 const lengths = ({ minLength = 0, maxLength = 40 }) => ({ minLength, maxLength: Math.min(maxLength, minLength + 40) });
