@@ -4,8 +4,8 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import fc from 'fast-check';
-import { full, temporaryFolder } from './harness/server.mjs';
-import { Model, World, steps } from './model/commands.mjs';
+import { full, startServer, temporaryFolder } from './harness/server.mjs';
+import { Model, World, stepsFor } from './model/commands.mjs';
 
 const seeds = process.env.FUZZ_SEED ? [Number(process.env.FUZZ_SEED)]
   : full ? Array.from({ length: 40 }, (_, k) => (Date.now() + 7919 * k) % 2 ** 31) : [1, 2, 3];
@@ -13,6 +13,8 @@ const length = full ? 300 : 60;
 
 test('commands at random, with restarts', async (t) => {
   const sum = {};
+  const { contract } = await startServer(t);
+  const steps = stepsFor(new Set(Object.values(contract.openapi.paths).flatMap((item) => Object.values(item)).map(({ operationId }) => operationId)));
   for (const seed of seeds) {
     await t.test(`FUZZ_SEED=${seed}`, async (t) => {
       // One run of many commands: shrinking it would start many servers, and what has been printed says what led to the fault.

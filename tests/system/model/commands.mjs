@@ -35,9 +35,9 @@ export class Model {
   }
 
   pick(n) { return this.jobs[n % this.jobs.length]; }
-  add(id, spec) {
+  add(id, spec, facts = {}) {
     assert.ok(!this.jobs.some((job) => job.id === id) && !this.gone.includes(id), `${id} is new`);
-    const job = new Job(id, { ends: spec.name !== 'endless', body: JSON.stringify(spec) });
+    const job = new Job(id, { ends: spec.name !== 'endless', body: JSON.stringify(spec), ...facts });
     this.jobs.push(job);
     return job;
   }
@@ -114,6 +114,7 @@ const remove = onJob('delete', async (model, world, job) => {
   assert.ok(job.mayBeRemoved, `${what}: ${job}`);
   model.jobs.splice(model.jobs.indexOf(job), 1);
   model.gone.push(job.id);
+  job.remove(model.jobs);
   for (const [key, one] of model.keys) if (one === job) model.keys.delete(key);
   assert.equal((await world.server.get(`/v1/jobs/${job.id}`)).status, 404);
 });
@@ -145,6 +146,46 @@ const list = fc.integer({ min: 1, max: 4 }).map((limit) => new Step('list', asyn
   assert.equal(Object.values(counts).reduce((sum, count) => sum + count, 0), model.jobs.length, 'the counts count every job');
 }, false, limit));
 
+/** A fork of what is stored by now; its first events are the origin's. */
+const fork = fc.tuple(fc.nat(), fc.nat(), fc.integer({ min: 1, max: 3 })).map(([n, m, seed]) => new Step('fork', async (model, world) => {
+  const job = model.pick(n);
+  // What ends soon has at most 12 cells; `finished` is never part of a fork.
+  const endlessly = !job.ends;
+  const stored = job.last - (job.ended ? 1 : 0);
+  if (stored < 1 && job.kind === 'colony') return;
+  const seq = 1 + m % Math.max(1, stored);
+  const body = { at_seq: seq, seed, name: 'fork', until: endlessly ? endless().until : { cells: 16 } };
+  const response = await world.server.post(`/v1/jobs/${job.id}/fork`, body);
+  if (job.kind === 'verify') {
+    assert.equal(response.status, 422, response.text);
+    return;
+  }
+  assert.equal(response.status, 201, `a fork of ${job} at ${seq}: ${response.text}`);
+  assert.deepEqual([response.json.origin.job_id, response.json.origin.at_seq], [job.id, seq]);
+  const made = model.add(response.json.id, body, { ends: !endlessly, last: seq });
+  made.seen(response.json, 'a fork');
+  const at = async ({ id }) => (await world.server.get(`/v1/jobs/${id}/events?after=${seq - 1}&limit=1`)).json.items[0];
+  assert.deepEqual(await at(made), await at(job), 'the last event of both');
+}, true, `${n}, ${m}, ${seed}`));
+
+const verify = onJob('verify', async (model, world, job) => {
+  const response = await command(world.server, job.id, 'verify');
+  assert.equal(response.status, job.kind === 'verify' ? 422 : 201, response.text);
+  if (response.status === 201) model.add(response.json.id, { name: 'verify' }, { kind: 'verify', target: job }).seen(response.json, 'a verification');
+});
+
+const edit = fc.tuple(fc.nat(), fc.constantFrom('', 'a name', 'another \u{1F9EB}'), fc.boolean()).map(([n, name, stale]) => new Step('edit', async (model, world) => {
+  const job = model.pick(n);
+  const patch = (headers = {}) => world.server.request('PATCH', `/v1/jobs/${job.id}`, { body: JSON.stringify({ name }), headers: { 'Content-Type': 'application/merge-patch+json', ...headers } });
+  if (job.ended && stale) {
+    const refused = await patch({ 'If-Match': `"${job.ended.revision + 1}.0"` });
+    assert.equal(refused.status, 412, refused.text);
+  }
+  const { status, json, text } = await patch(job.ended ? { 'If-Match': `"${job.ended.revision}.0"` } : {});
+  assert.equal(status, 200, text);
+  job.edited(json, { name });
+}, true, `${n}, ${JSON.stringify(name)}`));
+
 const missing = fc.nat().map((n) => new Step('a job that was deleted', async (model, world) => {
   if (model.gone.length === 0) return;
   const id = model.gone[n % model.gone.length];
@@ -158,4 +199,10 @@ const restart = fc.boolean().map((kill) => new Step(kill ? 'kill -9' : 'SIGTERM'
   for (const job of model.jobs) await look(world, job);
 }, false));
 
-export const steps = [submit, submit, submitKilled, ...['cancel', 'pause', 'pause', 'resume', 'resume'].map(commanded), remove, show, show, events, list, missing, restart];
+/** Each with the operation that it needs. */
+const further = { forkJob: [fork], verifyJob: [verify], editJob: [edit] };
+
+/** `operations`: the ids of those that the server's document has. */
+export const stepsFor = (operations) => [...common, ...Object.entries(further).flatMap(([id, steps]) => (operations.has(id) ? steps : []))];
+
+const common = [submit, submit, submitKilled, ...['cancel', 'pause', 'pause', 'resume', 'resume'].map(commanded), remove, show, show, events, list, missing, restart];

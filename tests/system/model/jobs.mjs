@@ -7,7 +7,7 @@ import { isDeepStrictEqual } from 'node:util';
 
 export const terminal = ['succeeded', 'failed', 'cancelled'];
 
-/** What happens without being asked. Nothing here fails: no job of the test comes near a limit. */
+/** What happens without being asked. Nothing here fails but a verification whose target is gone: no job of the test comes near a limit. */
 const alone = { queued: ['running'], running: ['succeeded'], pausing: ['paused', 'succeeded'], cancelling: ['cancelled', 'succeeded'] };
 const shown = (state) => (state === 'pausing' || state === 'cancelling' ? 'running' : state);
 
@@ -15,31 +15,53 @@ const shown = (state) => (state === 'pausing' || state === 'cancelling' ? 'runni
 const commands = {
   cancel: {
     queued: [[202, 'cancelled']], running: [[202, 'cancelling']], pausing: [[202, 'cancelling']], cancelling: [[202, 'cancelling'], [200, 'cancelling']],
-    paused: [[202, 'cancelled']], cancelled: [[200, 'cancelled']], succeeded: [[409, 'succeeded']],
+    paused: [[202, 'cancelled']], cancelled: [[200, 'cancelled']], succeeded: [[409, 'succeeded']], failed: [[409, 'failed']],
   },
   pause: {
     queued: [[202, 'paused']], running: [[202, 'pausing']], pausing: [[202, 'pausing'], [200, 'pausing']], cancelling: [[409, 'cancelling']],
-    paused: [[200, 'paused']], cancelled: [[409, 'cancelled']], succeeded: [[409, 'succeeded']],
+    paused: [[200, 'paused']], cancelled: [[409, 'cancelled']], succeeded: [[409, 'succeeded']], failed: [[409, 'failed']],
   },
   resume: {
     // A pause under way is waited for, and then resumed; if that takes too long the answer is 200 and the pause stands.
     queued: [[200, 'queued']], running: [[200, 'running']], pausing: [[202, 'queued'], [200, 'pausing']], cancelling: [[409, 'cancelling']],
-    paused: [[202, 'queued']], cancelled: [[409, 'cancelled']], succeeded: [[409, 'succeeded']],
+    paused: [[202, 'queued']], cancelled: [[409, 'cancelled']], succeeded: [[409, 'succeeded']], failed: [[409, 'failed']],
   },
 };
 
 export class Job {
-  /** `ends`: whether it can come to its end by itself. */
-  constructor(id, { ends, body }) {
-    Object.assign(this, { id, ends, body, last: 0, digest: undefined, ended: undefined });
+  /** `ends`: whether it can come to its end by itself. `target`: what a verification looks at. `last`: events that it begins with. */
+  constructor(id, { ends, body, kind = 'colony', target, last = 0 }) {
+    Object.assign(this, { id, ends, body, kind, target, last, digest: undefined, ended: undefined, gone: false });
     this.states = this.closed(['queued']);
   }
 
   /** The states and all that may follow from them by themselves. */
   closed(states) {
     const all = new Set(states);
-    for (const state of all) for (const next of alone[state] ?? []) if (this.ends || next !== 'succeeded') all.add(next);
+    for (const state of all) {
+      for (const next of alone[state] ?? []) {
+        if (this.ends || next !== 'succeeded') all.add(next);
+        // Nothing is left to verify.
+        if (next === 'succeeded' && this.target?.gone) all.add('failed');
+      }
+    }
     return all;
+  }
+
+  /** It was deleted. */
+  remove(jobs) {
+    this.gone = true;
+    for (const job of jobs) if (job.target === this) job.states = job.closed(job.states);
+  }
+
+  /** It was edited: nothing else may have changed. */
+  edited(json, change) {
+    const before = this.ended;
+    this.ended = undefined;
+    this.seen(json, 'an edit');
+    for (const [name, value] of Object.entries(change)) assert.deepEqual(json[name], value, `the ${name} that was asked for`);
+    if (before) assert.deepEqual({ ...json, revision: 0 }, { ...before, ...change, revision: 0 }, 'an edit changes nothing else');
+    if (before) assert.ok(json.revision >= before.revision && json.revision <= before.revision + 1, 'a revision grows by one');
   }
 
   toString() { return `${this.id} {${[...this.states].join(' ')}}`; }
@@ -72,6 +94,7 @@ export class Job {
     if (this.ended) assert.ok(isDeepStrictEqual(json, this.ended), `${what}: a finished job changed:\n${JSON.stringify(this.ended)}\n${JSON.stringify(json)}`);
     if (terminal.includes(json.state)) this.ended = json;
     if (json.state === 'paused') assert.equal(json.reason, 'user', what);
+    if (this.kind === 'verify' && json.state === 'succeeded') assert.equal(json.result.identical, true, `${what}: ${this} does not find what was grown`);
   }
 
   get mayBeRemoved() { return [...this.states].some((state) => terminal.includes(state)); }
@@ -92,6 +115,6 @@ export class Job {
       return;
     }
     assert.equal(finished, events.length - 1, `nothing follows the end of ${this}`);
-    this.narrow([...this.states].filter((state) => state === (last.reason === 'cancelled' ? 'cancelled' : 'succeeded')), `it finished: ${last.reason}`);
+    this.narrow([...this.states].filter((state) => (last.reason === 'cancelled' ? state === 'cancelled' : state === 'succeeded' || state === 'failed')), `it finished: ${last.reason}`);
   }
 }
