@@ -147,11 +147,25 @@ Json request_examples(std::string_view operation_id) {
             {"then", example("as it was after 20 h",
                              {{"job_id", kExampleId}, {"analysis_id", kExampleId}, {"at_h", 20}}, 201)}};
   }
+  if (operation_id == "forkJob") {
+    return {{"cooler",
+             example("slower cells from the fifth event on",
+                     {{"at_seq", 5}, {"until", {{"cells", 60}}}, {"model", {{"cycle", {{"mean_h", 15}}}}}}, 201)},
+            {"again", example("another seed after 15 h", {{"at_h", 15}, {"seed", 2}, {"until", {{"cells", 60}}}}, 201)},
+            {"late", example("an end before the fork", {{"at_h", 15}, {"until", {{"time_h", 1}}}}, 422)}};
+  }
+  if (operation_id == "editJob") {
+    return {{"renamed", example("another name", {{"name", "plate 7, second run"}}, 200)},
+            {"labelled", example("one label set, one taken away", {{"labels", {{"plate", "7"}, {"old", nullptr}}}}, 200)}};
+  }
+  if (operation_id == "createToken") {
+    return {{"reader", example("for a dashboard", {{"name", "dashboard"}, {"scope", "read"}, {"expires_h", 24}}, 201)}};
+  }
   return nullptr;
 }
 
 Json parameter_example(const QueryParam& param) {
-  static const std::array<std::pair<std::string_view, Json>, 13> kByName = {{{"cursor", nullptr},
+  static const std::array<std::pair<std::string_view, Json>, 14> kByName = {{{"cursor", nullptr},
                                                                             {"name", "AHH-1 at 37 C"},
                                                                             {"kind", "colony"},
                                                                             {"label", "plate:7"},
@@ -163,7 +177,8 @@ Json parameter_example(const QueryParam& param) {
                                                                             {"points", 50},
                                                                             {"cell_id", 1},
                                                                             {"channel", 0},
-                                                                            {"triangles_max", 50'000}}};
+                                                                            {"triangles_max", 50'000},
+                                                                            {"jobs", "all"}}};
   const auto known =
       std::find_if(kByName.begin(), kByName.end(), [&](const auto& one) { return one.first == param.name; });
   switch (param.type) {
@@ -191,7 +206,12 @@ void add_component_examples(Json& schemas) {
   const Json events = event_examples();
   const Json job = job_example();
   const Json series = series_example();
-  const Json log = encode_log_row({1, "2026-01-02T03:04:05.700Z", "info", "started"});
+  LogRow line;
+  line.index = 1;
+  line.at = "2026-01-02T03:04:05.700Z";
+  line.level = "info";
+  line.message = "started";
+  const Json log = encode_log_row(line);
   const auto add = [&](const char* component, Json examples) { schemas.at(component)["examples"] = std::move(examples); };
   const auto one = [](const Json& value) { return Json::array({value}); };
   const auto page = [&](const Json& item, const Json& next) { return one({{"items", one(item)}, {"next", next}}); };
