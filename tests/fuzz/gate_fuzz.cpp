@@ -69,7 +69,6 @@ void check_head(const RequestHead& head) {
 struct Body {
   BodyReader::State state = BodyReader::State::kNeedMore;
   std::string body, rest;
-  int refused = 0;
   friend bool operator==(const Body&, const Body&) = default;
 };
 
@@ -93,10 +92,8 @@ Body read_body(const RequestHead& head, std::string_view bytes, std::size_t step
   } else {
     result.rest.clear();
   }
-  if (result.state == BodyReader::State::kRefused) {
-    check_refusal(reader.refusal());
-    result.refused = reader.refusal().status;
-  }
+  // Which of several faults is told depends on which byte came last.
+  if (result.state == BodyReader::State::kRefused) check_refusal(reader.refusal());
   return result;
 }
 
