@@ -26,6 +26,16 @@ class Headers {
   std::vector<std::pair<std::string, std::string>> items_;
 };
 
+/// What somebody may do; each includes those before it.
+enum class Scope { kRead, kSubmit, kAdmin };
+
+/// Who asks. While tokens are off, every local user is "local" and an admin.
+struct Principal {
+  std::string name = "local";                                  // goes into submitted_by and the log of a job
+  Scope scope = Scope::kAdmin;
+  std::string token_id;                                        // empty: no token was needed
+};
+
 struct Request {
   std::string method;                                          // "GET", ...
   std::string path;                                            // percent-decoded, starts with '/', no query, base path removed
@@ -33,6 +43,7 @@ struct Request {
   Headers headers;
   std::string body;                                            // complete, within the limit
   std::string request_id;
+  Principal principal;                                         // set before the body is read
   std::vector<std::string> path_params;                        // filled by the router, e.g. the job id
 };
 

@@ -14,7 +14,7 @@ namespace {
 #define COLONY_JOB_COLUMNS                                                                                             \
   "SELECT job_key, id, kind, name, state, reason, detail, command, submitted_by, created_at, started_at, finished_at," \
   " revision, last_seq, digest, engine_version, spec, until_time_h, until_cells, time_h, cell_count, active_count,"    \
-  " passive_count, senescent_count FROM job WHERE deleted = 0"
+  " passive_count, senescent_count, origin, result FROM job WHERE deleted = 0"
 
 JobRow row_at(const Statement& row) {
   JobRow job;
@@ -46,6 +46,8 @@ JobRow row_at(const Statement& row) {
   job.active_count = static_cast<std::uint64_t>(row.integer(21));
   job.passive_count = static_cast<std::uint64_t>(row.integer(22));
   job.senescent_count = static_cast<std::uint64_t>(row.integer(23));
+  job.origin_json = row.text(24);
+  job.result_json = row.text(25);
   return job;
 }
 
@@ -126,12 +128,13 @@ std::uint64_t count_queued_rows(Connection& connection) {
 std::int64_t insert_job_row(Connection& connection, const NewJob& job) {
   Statement& to = connection.prepared(
       "INSERT INTO job (id, kind, name, state, reason, detail, submitted_by, created_at, revision, last_seq, digest,"
-      " engine_version, spec, until_time_h, until_cells, time_h, cell_count, active_count, passive_count, "
+      " engine_version, spec, origin, until_time_h, until_cells, time_h, cell_count, active_count, passive_count, "
       "senescent_count)"
-      " VALUES (?, 'colony', ?, 'queued', '', '', ?, ?, 1, 0, ?, ?, ?, ?, ?, 0, 0, 0, 0, 0)");
-  to.bind(std::string_view(new_job_id())).bind(std::string_view(job.name)).bind(std::string_view(job.submitted_by));
+      " VALUES (?, ?, ?, 'queued', '', '', ?, ?, 1, 0, ?, ?, ?, ?, ?, ?, 0, 0, 0, 0, 0)");
+  to.bind(std::string_view(new_job_id())).bind(std::string_view(job.kind)).bind(std::string_view(job.name));
+  to.bind(std::string_view(job.submitted_by));
   to.bind(std::string_view(wall_time_text())).bind_blob(Digest{}.bytes).bind(std::string_view(engine_version_text()));
-  to.bind(std::string_view(job.spec_json)).bind(job.until_time_h);
+  to.bind(std::string_view(job.spec_json)).bind_text_or_null(job.origin_json).bind(job.until_time_h);
   if (job.until_cells) {
     to.bind(static_cast<std::int64_t>(*job.until_cells));
   } else {
@@ -152,8 +155,8 @@ std::int64_t insert_job_row(Connection& connection, const NewJob& job) {
 void update_job_row(Connection& connection, const JobRow& job) {
   Statement& to = connection.prepared(
       "UPDATE job SET state = ?, reason = ?, detail = ?, command = ?, started_at = ?, finished_at = ?, revision = ?,"
-      " last_seq = ?, digest = ?, time_h = ?, cell_count = ?, active_count = ?, passive_count = ?, senescent_count = ?"
-      " WHERE job_key = ?");
+      " last_seq = ?, digest = ?, time_h = ?, cell_count = ?, active_count = ?, passive_count = ?, senescent_count = ?,"
+      " result = ? WHERE job_key = ?");
   to.bind(name_of(job.state)).bind(std::string_view(job.reason)).bind(std::string_view(job.detail));
   to.bind_text_or_null(job.command).bind_text_or_null(job.started_at).bind_text_or_null(job.finished_at);
   to.bind(static_cast<std::int64_t>(job.revision)).bind(static_cast<std::int64_t>(job.last_seq));
@@ -161,7 +164,7 @@ void update_job_row(Connection& connection, const JobRow& job) {
   for (const std::uint64_t count : {job.cell_count, job.active_count, job.passive_count, job.senescent_count}) {
     to.bind(static_cast<std::int64_t>(count));
   }
-  to.bind(job.job_key).run();
+  to.bind_text_or_null(job.result_json).bind(job.job_key).run();
 }
 
 std::optional<UsedKey> find_used_key(Connection& connection, const NewJob& job) {
@@ -180,24 +183,26 @@ void insert_used_key(Connection& connection, const NewJob& job, std::int64_t job
 }
 
 void insert_log_row(Connection& connection, std::int64_t job_key, const std::string& level,
-                    const std::string& message) {
+                    const std::string& message, const std::string& actor) {
   Statement& to = connection.prepared(
-      "INSERT INTO job_log SELECT ?1, coalesce(max(line), 0) + 1, ?2, ?3, ?4 FROM job_log WHERE job_key = ?1");
+      "INSERT INTO job_log (job_key, line, at, level, message, actor)"
+      " SELECT ?1, coalesce(max(line), 0) + 1, ?2, ?3, ?4, ?5 FROM job_log WHERE job_key = ?1");
   to.bind(job_key)
       .bind(std::string_view(wall_time_text()))
       .bind(std::string_view(level))
-      .bind(std::string_view(message));
+      .bind(std::string_view(message))
+      .bind(std::string_view(actor));
   to.run();
 }
 
 std::vector<LogRow> read_log_rows(Connection& connection, std::int64_t job_key, std::int64_t after_index,
                                   std::size_t limit) {
   Statement& row = connection.prepared(
-      "SELECT line, at, level, message FROM job_log WHERE job_key = ? AND line > ? ORDER BY line LIMIT ?");
+      "SELECT line, at, level, message, actor FROM job_log WHERE job_key = ? AND line > ? ORDER BY line LIMIT ?");
   constexpr auto kMax = static_cast<std::size_t>(std::numeric_limits<std::int64_t>::max());
   row.bind(job_key).bind(after_index).bind(static_cast<std::int64_t>(std::min(limit, kMax)));
   std::vector<LogRow> lines;
-  while (row.step()) lines.push_back({row.integer(0), row.text(1), row.text(2), row.text(3)});
+  while (row.step()) lines.push_back({row.integer(0), row.text(1), row.text(2), row.text(3), row.text(4)});
   return lines;
 }
 

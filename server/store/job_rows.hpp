@@ -39,7 +39,8 @@ struct UsedKey {
 std::optional<UsedKey> find_used_key(Connection& connection, const NewJob& job);
 void insert_used_key(Connection& connection, const NewJob& job, std::int64_t job_key);
 
-void insert_log_row(Connection& connection, std::int64_t job_key, const std::string& level, const std::string& message);
+void insert_log_row(Connection& connection, std::int64_t job_key, const std::string& level, const std::string& message,
+                    const std::string& actor = {});
 std::vector<LogRow> read_log_rows(Connection& connection, std::int64_t job_key, std::int64_t after_index,
                                   std::size_t limit);
 

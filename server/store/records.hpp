@@ -25,6 +25,7 @@ enum class JobCommand { kCancel, kPause, kResume, kResumeStorage };
 
 /// What a client submitted, after validation, in the form that is stored. `spec_json` is the complete normalised job spec.
 struct NewJob {
+  std::string kind = "colony";              // or "verify"
   std::string name;
   std::map<std::string, std::string> labels;
   std::string spec_json;
@@ -32,6 +33,7 @@ struct NewJob {
   std::optional<std::uint64_t> until_cells;
   std::string submitted_by = "local";
   std::string idempotency_key;             // empty: none
+  std::string origin_json;                 // of a fork: where its first rows come from (JSON); empty: none
   std::string body_hash;                   // of the request body as received; compared when the key is used again
 };
 
@@ -52,6 +54,8 @@ struct JobRow {
   Digest digest;
   std::string engine_version;
   std::string spec_json;
+  std::string origin_json;                 // of a fork {job_id, at_seq, spec, origin}; empty: none
+  std::string result_json;                 // of a job of kind "verify" that ended; empty: none
   std::optional<double> until_time_h;
   std::optional<std::uint64_t> until_cells;
   // As of last_seq, stored with the events:
@@ -65,6 +69,7 @@ struct LogRow {
   std::string at;                          // RFC 3339 UTC
   std::string level;                       // "info", "warning", "error"
   std::string message;
+  std::string actor = {};                       // who asked for it (name of a token, or "local"); empty: the service itself
 };
 
 }  // namespace colony::server

@@ -188,7 +188,24 @@ CREATE TABLE analysis_image (
 ) STRICT;
 )sql";
 
-constexpr std::array<const char*, 3> kMigrations = {kVersion1, kVersion2, kVersion3};  // kMigrations[v] leads from version v to v + 1
+// Who may ask, where a forked job comes from, what a job of kind `verify` found, and who did what.
+constexpr const char* kVersion4 = R"sql(
+CREATE TABLE token (
+  token_key INTEGER PRIMARY KEY AUTOINCREMENT,
+  id TEXT NOT NULL UNIQUE,
+  name TEXT NOT NULL,
+  scope TEXT NOT NULL CHECK (scope IN ('read', 'submit', 'admin')),
+  secret_hash BLOB NOT NULL UNIQUE,
+  created_by TEXT NOT NULL,
+  created_at TEXT NOT NULL,
+  expires_at TEXT
+) STRICT;
+ALTER TABLE job ADD COLUMN origin TEXT;
+ALTER TABLE job ADD COLUMN result TEXT;
+ALTER TABLE job_log ADD COLUMN actor TEXT NOT NULL DEFAULT '';
+)sql";
+
+constexpr std::array<const char*, 4> kMigrations = {kVersion1, kVersion2, kVersion3, kVersion4};  // kMigrations[v] leads from version v to v + 1
 
 std::int64_t pragma(Connection& writer, const char* sql) {
   Statement statement = writer.prepare_once(sql);

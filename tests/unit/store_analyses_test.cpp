@@ -4,8 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include "server/store/connection.hpp"
 #include "server/store/store.hpp"
+#include "tests/support/old_schema.hpp"
 #include "tests/support/temp_dir.hpp"
 
 namespace colony::server {
@@ -148,11 +148,7 @@ TEST_F(StoreAnalysesTest, OneThatKillsTheServerIsGivenUp) {
 TEST_F(StoreAnalysesTest, TheTablesComeToADatabaseOfTheSecondSchema) {
   made(picture("a"));
   store_.reset();
-  {
-    Connection old(dir_.path() + "/colony.db", Connection::Access::kWriter);
-    old.execute("DROP TABLE analysis; DROP TABLE analysis_image; PRAGMA user_version = 2");
-    old.checkpoint(true);
-  }
+  tests::take_back_to(dir_.path() + "/colony.db", 2);
   open();
   EXPECT_TRUE(analyses().list(AnalysisKind::kAnalysis, 10, "")->items.empty());
   made(picture("b"));

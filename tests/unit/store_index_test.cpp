@@ -8,6 +8,7 @@
 #include "server/store/cell_index.hpp"
 #include "server/store/connection.hpp"
 #include "server/store/store.hpp"
+#include "tests/support/old_schema.hpp"
 #include "tests/support/sample_events.hpp"
 #include "tests/support/temp_dir.hpp"
 
@@ -137,16 +138,9 @@ TEST_F(StoreIndexTest, IsMadeForADatabaseOfTheFirstSchema) {
   const std::int64_t job_key = running_job();
   append(many_cells(job_key, 1, 300));
   store_.reset();
-  {
-    Connection old(dir_.path() + "/colony.db", Connection::Access::kWriter);
-    old.execute(
-        "DROP TABLE analysis; DROP TABLE analysis_image; DROP TABLE cell_event; ALTER TABLE job DROP COLUMN indexed_seq;"
-        "CREATE INDEX event_by_cell ON event (job_key, cell_id, seq);"
-        "CREATE INDEX placement_by_cell ON placement (job_key, cell_id, seq); PRAGMA user_version = 1");
-    old.checkpoint(true);
-  }
+  tests::take_back_to(dir_.path() + "/colony.db", 1);
   open();
-  EXPECT_EQ(number("PRAGMA user_version"), 3);
+  EXPECT_EQ(number("PRAGMA user_version"), 4);
   EXPECT_EQ(number("SELECT indexed_seq FROM job"), 300);
   EXPECT_EQ(number("SELECT count(*) FROM sqlite_schema WHERE name IN ('event_by_cell', 'placement_by_cell')"), 0);
   expect_exact(job_key);
