@@ -8,7 +8,7 @@ import { startServer } from './harness/server.mjs';
 import { openStream } from './harness/stream.mjs';
 
 /** Long answers, measured by their own tests; an example of them would be pages. */
-const tooLong = ['Analysis', 'AnalysisList', 'Comparison', 'ComparisonList', 'JobAnalysis', 'CreatedToken', 'Health', 'JobCounts', 'Lineage', 'ServiceInfo', 'Submission',
+const tooLong = ['Analysis', 'AnalysisList', 'Comparison', 'ComparisonList', 'JobAnalysis', 'CreatedToken', 'Health', 'JobCounts', 'Lineage', 'ObjectList', 'ServiceInfo', 'Submission',
   'TokenList'];
 /** An opaque value has no example; no path parameter's example exists on a server, so a real one is put in its place. */
 const opaque = ['cursor'];
