@@ -27,18 +27,19 @@ Json labelled_spec() {
 
 Json spec_examples() {
   const Json places = Json::array({Json::array({0, 0}), Json::array({400, 0}), Json::array({-150, 320})});
-  return {{"smallest", example("a bound is all that is needed", {{"until", {{"cells", 100}}}}, 201)},
-          {"labelled", example("a culture with its own cycle", labelled_spec(), 201)},
-          {"founders",
-           example("three founders where they were seen",
-                   {{"preset", "clonogenic"}, {"until", {{"time_h", 96}}}, {"model", {{"founders", {{"positions_um", places}}}}}},
-                   201)},
-          {"crawling",
-           example("cells that crawl", {{"preset", "young-colony"}, {"seed", 7}, {"until", {{"time_h", 72}}}}, 201)},
-          // Right by the schema, which cannot state a rule between two fields.
-          {"refused",
-           example("a spread of more than a quarter of the mean",
-                   {{"until", {{"cells", 100}}}, {"model", {{"cycle", {{"mean_h", 12}, {"sd_h", 5}}}}}}, 422)}};
+  return {
+      {"smallest", example("a bound is all that is needed", {{"until", {{"cells", 100}}}}, 201)},
+      {"labelled", example("a culture with its own cycle", labelled_spec(), 201)},
+      {"founders", example("three founders where they were seen",
+                           {{"preset", "clonogenic"},
+                            {"until", {{"time_h", 96}}},
+                            {"model", {{"founders", {{"positions_um", places}}}}}},
+                           201)},
+      {"crawling",
+       example("cells that crawl", {{"preset", "young-colony"}, {"seed", 7}, {"until", {{"time_h", 72}}}}, 201)},
+      // Right by the schema, which cannot state a rule between two fields.
+      {"refused", example("a spread of more than a quarter of the mean",
+                          {{"until", {{"cells", 100}}}, {"model", {{"cycle", {{"mean_h", 12}, {"sd_h", 5}}}}}}, 422)}};
 }
 
 Cell example_cell(std::uint32_t id) {
@@ -86,11 +87,10 @@ Json event_examples() {
                         .deformed_volume_um3 = 1050.5,
                         .due_h = 23.75};
   Json examples = Json::array();
-  for (const Event& event :
-       {example_event(1, 0.0, Founded{example_cell(1)}), example_event(2, 11.5, divided),
-        example_event(3, 13.5, settled), example_event(4, 14.0, Moved{example_cell(1), {}}),
-        example_event(5, 23.75, inhibited), example_event(6, 480.0, Senesced{}),
-        example_event(7, 500.0, Finished{FinishReason::kAllSenescent, 2})}) {
+  for (const Event& event : {example_event(1, 0.0, Founded{example_cell(1)}), example_event(2, 11.5, divided),
+                             example_event(3, 13.5, settled), example_event(4, 14.0, Moved{example_cell(1), {}}),
+                             example_event(5, 23.75, inhibited), example_event(6, 480.0, Senesced{}),
+                             example_event(7, 500.0, Finished{FinishReason::kAllSenescent, 2})}) {
     examples.push_back(encode_event(event));
   }
   return examples;
@@ -134,7 +134,8 @@ Json problem_example() {
           {"status", row.status},
           {"detail", "the spec has 1 wrong field"},
           {"request_id", "bd369d05af61848dc56f545dea31a388"},
-          {"errors", Json::array({{{"pointer", "/model/cycle/sd_h"}, {"message", "must be at most a quarter of mean_h"}}})}};
+          {"errors",
+           Json::array({{{"pointer", "/model/cycle/sd_h"}, {"message", "must be at most a quarter of mean_h"}}})}};
 }
 
 }  // namespace
@@ -142,21 +143,22 @@ Json problem_example() {
 Json request_examples(std::string_view operation_id) {
   if (operation_id == "submitJob") return spec_examples();
   if (operation_id == "compare") {
-    return {{"now",
-             example("a colony as it is, beside a picture", {{"job_id", kExampleId}, {"analysis_id", kExampleId}}, 201)},
+    return {{"now", example("a colony as it is, beside a picture",
+                            {{"job_id", kExampleId}, {"analysis_id", kExampleId}}, 201)},
             {"then", example("as it was after 20 h",
                              {{"job_id", kExampleId}, {"analysis_id", kExampleId}, {"at_h", 20}}, 201)}};
   }
   if (operation_id == "forkJob") {
-    return {{"cooler",
-             example("slower cells from the fifth event on",
-                     {{"at_seq", 5}, {"until", {{"cells", 60}}}, {"model", {{"cycle", {{"mean_h", 15}}}}}}, 201)},
-            {"again", example("another seed after 15 h", {{"at_h", 15}, {"seed", 2}, {"until", {{"cells", 60}}}}, 201)},
-            {"late", example("an end before the fork", {{"at_h", 15}, {"until", {{"time_h", 1}}}}, 422)}};
+    return {
+        {"cooler", example("slower cells from the fifth event on",
+                           {{"at_seq", 5}, {"until", {{"cells", 60}}}, {"model", {{"cycle", {{"mean_h", 15}}}}}}, 201)},
+        {"again", example("another seed after 15 h", {{"at_h", 15}, {"seed", 2}, {"until", {{"cells", 60}}}}, 201)},
+        {"late", example("an end before the fork", {{"at_h", 15}, {"until", {{"time_h", 1}}}}, 422)}};
   }
   if (operation_id == "editJob") {
-    return {{"renamed", example("another name", {{"name", "plate 7, second run"}}, 200)},
-            {"labelled", example("one label set, one taken away", {{"labels", {{"plate", "7"}, {"old", nullptr}}}}, 200)}};
+    return {
+        {"renamed", example("another name", {{"name", "plate 7, second run"}}, 200)},
+        {"labelled", example("one label set, one taken away", {{"labels", {{"plate", "7"}, {"old", nullptr}}}}, 200)}};
   }
   if (operation_id == "createToken") {
     return {{"reader", example("for a dashboard", {{"name", "dashboard"}, {"scope", "read"}, {"expires_h", 24}}, 201)}};
@@ -166,19 +168,19 @@ Json request_examples(std::string_view operation_id) {
 
 Json parameter_example(const QueryParam& param) {
   static const std::array<std::pair<std::string_view, Json>, 14> kByName = {{{"cursor", nullptr},
-                                                                            {"name", "AHH-1 at 37 C"},
-                                                                            {"kind", "colony"},
-                                                                            {"label", "plate:7"},
-                                                                            {"limit", 20},
-                                                                            {"after", 100},
-                                                                            {"at_h", 20.5},
-                                                                            {"um_per_px", 0.5},
-                                                                            {"width_px", 640},
-                                                                            {"points", 50},
-                                                                            {"cell_id", 1},
-                                                                            {"channel", 0},
-                                                                            {"triangles_max", 50'000},
-                                                                            {"jobs", "all"}}};
+                                                                             {"name", "AHH-1 at 37 C"},
+                                                                             {"kind", "colony"},
+                                                                             {"label", "plate:7"},
+                                                                             {"limit", 20},
+                                                                             {"after", 100},
+                                                                             {"at_h", 20.5},
+                                                                             {"um_per_px", 0.5},
+                                                                             {"width_px", 640},
+                                                                             {"points", 50},
+                                                                             {"cell_id", 1},
+                                                                             {"channel", 0},
+                                                                             {"triangles_max", 50'000},
+                                                                             {"jobs", "all"}}};
   const auto known =
       std::find_if(kByName.begin(), kByName.end(), [&](const auto& one) { return one.first == param.name; });
   switch (param.type) {
@@ -212,7 +214,9 @@ void add_component_examples(Json& schemas) {
   line.level = "info";
   line.message = "started";
   const Json log = encode_log_row(line);
-  const auto add = [&](const char* component, Json examples) { schemas.at(component)["examples"] = std::move(examples); };
+  const auto add = [&](const char* component, Json examples) {
+    schemas.at(component)["examples"] = std::move(examples);
+  };
   const auto one = [](const Json& value) { return Json::array({value}); };
   const auto page = [&](const Json& item, const Json& next) { return one({{"items", one(item)}, {"next", next}}); };
   add("Job", one(job));

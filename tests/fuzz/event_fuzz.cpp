@@ -6,11 +6,10 @@
 #include <bit>
 #include <cmath>
 #include <cstdlib>
+#include <fuzzer/FuzzedDataProvider.h>
 #include <iostream>
 #include <memory>
 #include <string>
-
-#include <fuzzer/FuzzedDataProvider.h>
 
 #include "server/api/codec_event.hpp"
 #include "server/api/event_text.hpp"
@@ -137,7 +136,8 @@ class Maker {
 
 Connection& database() {
   static const std::unique_ptr<Connection> one = [] {
-    static const tests::TempDir folder;  // a log needs a file; every transaction is rolled back, so little is ever written
+    static const tests::TempDir
+        folder;  // a log needs a file; every transaction is rolled back, so little is ever written
     auto made = std::make_unique<Connection>(folder.path() + "/fuzz.db", Connection::Access::kWriter);
     prepare_database(*made);
     return made;
@@ -158,12 +158,13 @@ void check_text(const Event& event) {
 /// One column of one table becomes something else; what the schema refuses stays as it was.
 void tamper(FuzzedDataProvider& from, Connection& connection) {
   static constexpr std::array<const char*, 15> kColumns = {
-      "event SET kind",        "event SET cell_id",       "event SET reason",      "event SET digest",
-      "event SET due_h",       "event SET try_count",     "event SET corrected",   "event SET evaluation_count",
-      "event SET cell_count",  "placement SET cell_id",   "placement SET activity", "placement SET parent_id",
-      "placement SET slot",    "placement SET generation", "woken SET cell_id"};
+      "event SET kind",       "event SET cell_id",        "event SET reason",       "event SET digest",
+      "event SET due_h",      "event SET try_count",      "event SET corrected",    "event SET evaluation_count",
+      "event SET cell_count", "placement SET cell_id",    "placement SET activity", "placement SET parent_id",
+      "placement SET slot",   "placement SET generation", "woken SET cell_id"};
   static constexpr std::array<const char*, 12> kValues = {
-      "NULL", "0", "-1", "9223372036854775807", "-9223372036854775808", "''", "'moved'", "x'00'", "x''", "9e999", "'divided'", "4294967296"};
+      "NULL", "0",     "-1",        "9223372036854775807", "-9223372036854775808", "''", "'moved'", "x'00'",
+      "x''",  "9e999", "'divided'", "4294967296"};
   const std::string sql = std::string("UPDATE ") + kColumns[from.ConsumeIntegralInRange<std::size_t>(0, 14)] + " = " +
                           kValues[from.ConsumeIntegralInRange<std::size_t>(0, 11)];
   try {

@@ -32,7 +32,8 @@ Reading read(std::string_view bytes, std::size_t step) {
   client::SseParser parser;
   Reading reading;
   for (std::size_t at = 0; at < bytes.size(); at += step) {
-    parser.feed(bytes.substr(at, step), [&](const client::SseEvent& event) { reading.events.emplace_back(event.name, event.data); });
+    parser.feed(bytes.substr(at, step),
+                [&](const client::SseEvent& event) { reading.events.emplace_back(event.name, event.data); });
   }
   reading.last_id = parser.last_id();
   reading.retry = parser.retry();

@@ -38,7 +38,9 @@ test('every operation, with right and with broken requests', async (t) => {
   const kept = new Set([job.id, paused]);
   const figures = { operations: 0, right: 0, taken: 0, broken: 0 };
 
-  const listed = ['/v1/jobs', '/v1/analyses', '/v1/comparisons', '/v1/tokens'].filter((path) => contract.openapi.paths[path]?.get);
+  const listed = ['/v1/jobs', '/v1/analyses', '/v1/comparisons', '/v1/tokens'].filter(
+    (path) => contract.openapi.paths[path]?.get,
+  );
   /** Everything that a request could have changed. */
   const everything = async () => {
     const lists = await Promise.all(listed.map((path) => server.get(path)));
@@ -54,7 +56,8 @@ test('every operation, with right and with broken requests', async (t) => {
     }
     for (const path of listed.slice(1)) {
       for (const { id } of (await server.get(path)).json.items) {
-        if (id !== analysis.json.id && id !== comparison.json.id) assert.equal((await server.request('DELETE', `${path}/${id}`)).status, 204);
+        if (id !== analysis.json.id && id !== comparison.json.id)
+          assert.equal((await server.request('DELETE', `${path}/${id}`)).status, 204);
       }
     }
   };
@@ -64,43 +67,65 @@ test('every operation, with right and with broken requests', async (t) => {
     return response;
   };
 
-  const operations = Object.entries(contract.openapi.paths).flatMap(([template, item]) => methods.filter((method) => item[method])
-    .map((method) => ({ method: method.toUpperCase(), template, operation: item[method] })));
+  const operations = Object.entries(contract.openapi.paths).flatMap(([template, item]) =>
+    methods
+      .filter((method) => item[method])
+      .map((method) => ({ method: method.toUpperCase(), template, operation: item[method] })),
+  );
   for (const each of operations) {
     // What removes or moves a job on finds the finished one, which refuses.
     const removes = each.method === 'DELETE' || each.method === 'POST';
-    const plan = new Plan(contract, each, { picture, known: {
-      job_id: each.method === 'DELETE' ? [paused] : removes ? [job.id] : [job.id, paused],
-      ...(each.method === 'DELETE' ? {} : { analysis_id: [analysis.json.id], comparison_id: [comparison.json.id] }),
-      step: ['signal', 'mask'] } });
+    const plan = new Plan(contract, each, {
+      picture,
+      known: {
+        job_id: each.method === 'DELETE' ? [paused] : removes ? [job.id] : [job.id, paused],
+        ...(each.method === 'DELETE' ? {} : { analysis_id: [analysis.json.id], comparison_id: [comparison.json.id] }),
+        step: ['signal', 'mask'],
+      },
+    });
     const name = `${each.method} ${each.template}`;
     ++figures.operations;
 
-    if (!plan.isStream) await t.test(`${name}: requests that fit`, async () => {
-      const { operationId } = each.operation;
-      const many = operationId === 'submitJob' ? 10 : slow.includes(operationId) ? 1 / 6 : 1;
-      await fc.assert(fc.asyncProperty(plan.right, async (request) => {
-        const response = await exchange(request);
-        const absent = response.status === 404 && (request.path.includes(nobody) || /\/steps\//.test(request.path));
-        assert.ok(response.status < 400 || lawful.includes(response.status) || absent, `a request that fits: ${response.status} ${response.text.slice(0, 800)}`);
-        ++figures.right;
-        figures.taken += response.status < 300;
-        if (response.status === 201 || response.status === 202) await clear();
-      }), { seed, numRuns: Math.ceil(rightRuns * many), endOnFailure: !full });
-      await clear();
-    });
+    if (!plan.isStream)
+      await t.test(`${name}: requests that fit`, async () => {
+        const { operationId } = each.operation;
+        const many = operationId === 'submitJob' ? 10 : slow.includes(operationId) ? 1 / 6 : 1;
+        await fc.assert(
+          fc.asyncProperty(plan.right, async (request) => {
+            const response = await exchange(request);
+            const absent = response.status === 404 && (request.path.includes(nobody) || /\/steps\//.test(request.path));
+            assert.ok(
+              response.status < 400 || lawful.includes(response.status) || absent,
+              `a request that fits: ${response.status} ${response.text.slice(0, 800)}`,
+            );
+            ++figures.right;
+            figures.taken += response.status < 300;
+            if (response.status === 201 || response.status === 202) await clear();
+          }),
+          { seed, numRuns: Math.ceil(rightRuns * many), endOnFailure: !full },
+        );
+        await clear();
+      });
 
     await t.test(`${name}: broken requests`, async () => {
       const before = await everything();
       const many = plan.media.length > 0 ? 2 : 1;
-      await fc.assert(fc.asyncProperty(plan.broken, async (request) => {
-        const response = await exchange(request);
-        assert.ok(request.statuses.includes(response.status), `${request.what}: ${response.status}, not ${request.statuses}: ${response.text.slice(0, 800)}`);
-        assert.deepEqual(await everything(), before, `${request.what}: something was stored`);
-        ++figures.broken;
-      }), { seed, numRuns: brokenRuns * many, endOnFailure: !full });
+      await fc.assert(
+        fc.asyncProperty(plan.broken, async (request) => {
+          const response = await exchange(request);
+          assert.ok(
+            request.statuses.includes(response.status),
+            `${request.what}: ${response.status}, not ${request.statuses}: ${response.text.slice(0, 800)}`,
+          );
+          assert.deepEqual(await everything(), before, `${request.what}: something was stored`);
+          ++figures.broken;
+        }),
+        { seed, numRuns: brokenRuns * many, endOnFailure: !full },
+      );
     });
   }
-  t.diagnostic(`figure: contract fuzz: ${figures.operations} operations, ${figures.right} requests that fit (${figures.taken} taken), ${figures.broken} broken ones refused (FUZZ_SEED=${seed})`);
+  t.diagnostic(
+    `figure: contract fuzz: ${figures.operations} operations, ${figures.right} requests that fit (${figures.taken} taken), ${figures.broken} broken ones refused (FUZZ_SEED=${seed})`,
+  );
   assert.ok(figures.operations > 30 && figures.taken > figures.right / 3, JSON.stringify(figures));
 });

@@ -8,8 +8,21 @@ import { startServer } from './harness/server.mjs';
 import { openStream } from './harness/stream.mjs';
 
 /** Long answers, measured by their own tests; an example of them would be pages. */
-const tooLong = ['Analysis', 'AnalysisList', 'Comparison', 'ComparisonList', 'JobAnalysis', 'CreatedToken', 'Health', 'JobCounts', 'Lineage', 'ObjectList', 'ServiceInfo', 'Submission',
-  'TokenList'];
+const tooLong = [
+  'Analysis',
+  'AnalysisList',
+  'Comparison',
+  'ComparisonList',
+  'JobAnalysis',
+  'CreatedToken',
+  'Health',
+  'JobCounts',
+  'Lineage',
+  'ObjectList',
+  'ServiceInfo',
+  'Submission',
+  'TokenList',
+];
 /** An opaque value has no example; no path parameter's example exists on a server, so a real one is put in its place. */
 const opaque = ['cursor'];
 
@@ -17,8 +30,11 @@ const methods = ['get', 'post', 'patch', 'put', 'delete'];
 
 /** Every operation of the document: {method, template, operation}. */
 export function operations(document) {
-  return Object.entries(document.paths).flatMap(([template, item]) => methods.filter((method) => item[method])
-    .map((method) => ({ method: method.toUpperCase(), template, operation: item[method] })));
+  return Object.entries(document.paths).flatMap(([template, item]) =>
+    methods
+      .filter((method) => item[method])
+      .map((method) => ({ method: method.toUpperCase(), template, operation: item[method] })),
+  );
 }
 
 /** Every object of the document with the given member: [pointer, object]. Schemas' `properties` name fields, not keywords. */
@@ -42,15 +58,20 @@ test('the examples of openapi.json', async (t) => {
   const comparison = await server.post('/v1/comparisons', { job_id: job.id, analysis_id: analysis.json.id });
   assert.equal(comparison.status, 201, comparison.text);
   const known = { job_id: job.id, analysis_id: analysis.json.id, comparison_id: comparison.json.id, step: 'signal' };
-  const pathOf = (template) => template.replace(/\{(\w+)\}/g, (_, name) => {
-    assert.ok(known[name], `this test knows no ${name}`);
-    return known[name];
-  });
+  const pathOf = (template) =>
+    template.replace(/\{(\w+)\}/g, (_, name) => {
+      assert.ok(known[name], `this test knows no ${name}`);
+      return known[name];
+    });
   /** The body with real ids in place of stand-ins. */
-  const real = (value) => (value !== null && typeof value === 'object' && !Array.isArray(value)
-    ? Object.fromEntries(Object.entries(value).map(([name, one]) => [name, known[name] ?? one])) : value);
-  const bodies = (operation) => Object.entries(contract.resolve(operation.requestBody)?.content ?? {})
-    .flatMap(([media, content]) => Object.entries(content.examples ?? {}).map(([name, example]) => ({ media, name, example, schema: content.schema })));
+  const real = (value) =>
+    value !== null && typeof value === 'object' && !Array.isArray(value)
+      ? Object.fromEntries(Object.entries(value).map(([name, one]) => [name, known[name] ?? one]))
+      : value;
+  const bodies = (operation) =>
+    Object.entries(contract.resolve(operation.requestBody)?.content ?? {}).flatMap(([media, content]) =>
+      Object.entries(content.examples ?? {}).map(([name, example]) => ({ media, name, example, schema: content.schema })),
+    );
 
   await t.test('examples fit their schemas', () => {
     let count = 0;
@@ -61,7 +82,10 @@ test('the examples of openapi.json', async (t) => {
       }
     }
     for (const [pointer, owner] of having('schema', document)) {
-      const values = [...('example' in owner ? [owner.example] : []), ...Object.values(owner.examples ?? {}).map(({ value }) => value)];
+      const values = [
+        ...('example' in owner ? [owner.example] : []),
+        ...Object.values(owner.examples ?? {}).map(({ value }) => value),
+      ];
       for (const value of values) {
         contract.validate(owner.schema, value, pointer);
         ++count;
@@ -72,16 +96,23 @@ test('the examples of openapi.json', async (t) => {
   });
 
   await t.test('every short answer, request body and parameter has one', () => {
-    const referred = new Set(operations(document).flatMap(({ operation }) => Object.values(operation.responses))
-      .flatMap((answer) => Object.values(contract.resolve(answer).content ?? {})).map(({ schema }) => schema?.$ref?.split('/').at(-1)).filter(Boolean));
+    const referred = new Set(
+      operations(document)
+        .flatMap(({ operation }) => Object.values(operation.responses))
+        .flatMap((answer) => Object.values(contract.resolve(answer).content ?? {}))
+        .map(({ schema }) => schema?.$ref?.split('/').at(-1))
+        .filter(Boolean),
+    );
     const bare = [...referred].filter((name) => !document.components.schemas[name].examples && !tooLong.includes(name));
     for (const { method, template, operation } of operations(document)) {
       const json = contract.resolve(operation.requestBody)?.content ?? {};
       for (const [media, { schema, examples }] of Object.entries(json)) {
-        if (media.endsWith('json') && contract.resolve(schema).maxProperties !== 0 && !examples) bare.push(`${method} ${template} ${media}`);
+        if (media.endsWith('json') && contract.resolve(schema).maxProperties !== 0 && !examples)
+          bare.push(`${method} ${template} ${media}`);
       }
       for (const parameter of (operation.parameters ?? []).map((one) => contract.resolve(one))) {
-        if (parameter.in === 'query' && !('example' in parameter) && !opaque.includes(parameter.name)) bare.push(`${method} ${template} ${parameter.name}`);
+        if (parameter.in === 'query' && !('example' in parameter) && !opaque.includes(parameter.name))
+          bare.push(`${method} ${template} ${parameter.name}`);
       }
     }
     assert.deepEqual(bare, []);
@@ -91,7 +122,10 @@ test('the examples of openapi.json', async (t) => {
     let count = 0;
     for (const { method, template, operation } of operations(document)) {
       for (const { media, name, example } of bodies(operation)) {
-        const response = await server.request(method, pathOf(template), { body: JSON.stringify(real(example.value)), headers: { 'Content-Type': media } });
+        const response = await server.request(method, pathOf(template), {
+          body: JSON.stringify(real(example.value)),
+          headers: { 'Content-Type': media },
+        });
         assert.equal(response.status, example['x-answer'], `${method} ${template}, ${name}: ${response.text.slice(0, 500)}`);
         ++count;
       }
@@ -99,7 +133,8 @@ test('the examples of openapi.json', async (t) => {
     t.diagnostic(`${count} requests`);
     assert.ok(count >= 7);
     // What was submitted need not grow on.
-    for (const { id, state } of (await server.get('/v1/jobs')).json.items) if (!terminal.includes(state)) await command(server, id, 'cancel');
+    for (const { id, state } of (await server.get('/v1/jobs')).json.items)
+      if (!terminal.includes(state)) await command(server, id, 'cancel');
   });
 
   await t.test('every example of a parameter is accepted', async () => {
@@ -115,16 +150,23 @@ test('the examples of openapi.json', async (t) => {
           ...(method === 'GET' ? {} : { 'Content-Type': body?.media ?? (image ? 'image/png' : 'application/json') }),
           ...(parameter.in === 'header' ? { [parameter.name]: text } : {}),
         };
-        const answers = Object.values(operation.responses).flatMap((answer) => Object.keys(contract.resolve(answer).content ?? {})).filter((media) => !media.startsWith('application/problem'));
+        const answers = Object.values(operation.responses)
+          .flatMap((answer) => Object.keys(contract.resolve(answer).content ?? {}))
+          .filter((media) => !media.startsWith('application/problem'));
         if (answers.every((media) => media === 'text/event-stream')) {
           assert.equal((await openStream(t, server, pathOf(template) + query)).status, 200);
           ++count;
           continue;
         }
-        const response = await server.request(method, pathOf(template) + query,
-          { headers, body: image ? picture : body && JSON.stringify(real(body.example.value)) });
+        const response = await server.request(method, pathOf(template) + query, {
+          headers,
+          body: image ? picture : body && JSON.stringify(real(body.example.value)),
+        });
         // A stated condition may not hold; that is an answer too.
-        assert.ok(response.status < 400 || response.status === 412, `${method} ${template} ${parameter.name}=${text}: ${response.status} ${response.text.slice(0, 500)}`);
+        assert.ok(
+          response.status < 400 || response.status === 412,
+          `${method} ${template} ${parameter.name}=${text}: ${response.status} ${response.text.slice(0, 500)}`,
+        );
         ++count;
       }
     }

@@ -22,16 +22,27 @@ async function byRedocly(document) {
   return found.map(({ ruleId, location, message }) => `${ruleId} at ${location[0]?.pointer}: ${message}`);
 }
 
-const linters = [['spectral', bySpectral], ['redocly', byRedocly]];
+const linters = [
+  ['spectral', bySpectral],
+  ['redocly', byRedocly],
+];
 
 test('openapi.json by its linters', async (t) => {
   const server = await startServer(t);
   const document = server.contract.openapi;
   assert.equal(document.openapi, '3.1.0');
-  await t.test('where there are tokens, every operation says which it needs', { skip: !document.components.securitySchemes && 'no tokens' }, () => {
-    const open = Object.entries(document.paths).flatMap(([path, item]) => Object.entries(item).filter(([, { security }]) => !security).map(([method]) => `${method} ${path}`));
-    assert.deepEqual(open, []);
-  });
+  await t.test(
+    'where there are tokens, every operation says which it needs',
+    { skip: !document.components.securitySchemes && 'no tokens' },
+    () => {
+      const open = Object.entries(document.paths).flatMap(([path, item]) =>
+        Object.entries(item)
+          .filter(([, { security }]) => !security)
+          .map(([method]) => `${method} ${path}`),
+      );
+      assert.deepEqual(open, []);
+    },
+  );
   for (const [name, lint] of linters) {
     await t.test(`${name}: no error, no warning`, async () => assert.deepEqual(await lint(document), []));
     await t.test(`${name}: a canary: a spoiled document is found out`, async () => {

@@ -17,7 +17,9 @@ test('submissions at once with one Idempotency-Key', async (t) => {
     for (let round = 0; round < rounds; ++round) {
       const before = await total(server);
       const key = { 'Idempotency-Key': `same ${round}` };
-      const answers = await Promise.all(Array.from({ length: 2 + round % 5 }, () => server.post('/v1/jobs', small(round, 1), key)));
+      const answers = await Promise.all(
+        Array.from({ length: 2 + (round % 5) }, () => server.post('/v1/jobs', small(round, 1), key)),
+      );
       assert.deepEqual(answers.map(({ status }) => status).sort(), [...answers.slice(1).map(() => 200), 201]);
       assert.equal(new Set(answers.map(({ json }) => json.id)).size, 1);
       assert.equal(await total(server), before + 1);
@@ -80,7 +82,7 @@ test('a finished job never changes', async (t) => {
     const reasons = {};
     for (let round = 0; round < rounds; ++round) {
       const { id } = await submit(server, small(round, 1 + Math.floor(random() * 100)));
-      const views = [];  // of one client, one after the other: the order in which they were true
+      const views = []; // of one client, one after the other: the order in which they were true
       const looks = async () => {
         for (let k = 0; k < 10; ++k) views.push((await show(server, id)).state);
       };
@@ -100,11 +102,21 @@ test('a finished job never changes', async (t) => {
       const first = views.findIndex((state) => terminal.includes(state));
       if (first >= 0) assert.deepEqual([...new Set(views.slice(first))], [job.state], `it was ${views}, now ${job.state}`);
       const events = await allEvents(server, id);
-      assert.deepEqual(events.map(({ seq }) => seq), events.map((_, index) => index + 1));
+      assert.deepEqual(
+        events.map(({ seq }) => seq),
+        events.map((_, index) => index + 1),
+      );
       const finished = events.filter(({ kind }) => kind === 'finished');
-      assert.deepEqual([finished.length, events.at(-1).kind, job.last_seq], [1, 'finished', events.length], 'one end, and it is the last event');
+      assert.deepEqual(
+        [finished.length, events.at(-1).kind, job.last_seq],
+        [1, 'finished', events.length],
+        'one end, and it is the last event',
+      );
       assert.equal(finished[0].reason, job.reason);
-      assert.ok(job.state === 'cancelled' ? job.reason === 'cancelled' : job.state === 'succeeded', `${job.state}, ${job.reason}`);
+      assert.ok(
+        job.state === 'cancelled' ? job.reason === 'cancelled' : job.state === 'succeeded',
+        `${job.state}, ${job.reason}`,
+      );
       reasons[job.state] = (reasons[job.state] ?? 0) + 1;
       ended.set(id, job);
     }
@@ -115,10 +127,12 @@ test('a finished job never changes', async (t) => {
   await t.test('commands afterwards, SIGTERM and kill -9 change nothing', async () => {
     for (const end of ['stop', 'kill']) {
       for (const [id, job] of ended) {
-        await Promise.all(['cancel', 'pause', 'resume'].map(async (name) => {
-          const { status } = await command(server, id, name);
-          assert.equal(status, name === 'cancel' && job.state === 'cancelled' ? 200 : 409, name);
-        }));
+        await Promise.all(
+          ['cancel', 'pause', 'resume'].map(async (name) => {
+            const { status } = await command(server, id, name);
+            assert.equal(status, name === 'cancel' && job.state === 'cancelled' ? 200 : 409, name);
+          }),
+        );
       }
       await server[end]();
       server = await startServer(t, { data: server.data });

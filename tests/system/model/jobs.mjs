@@ -8,23 +8,55 @@ import { isDeepStrictEqual } from 'node:util';
 export const terminal = ['succeeded', 'failed', 'cancelled'];
 
 /** What happens without being asked. Nothing here fails but a verification whose target is gone: no job of the test comes near a limit. */
-const alone = { queued: ['running'], running: ['succeeded'], pausing: ['paused', 'succeeded'], cancelling: ['cancelled', 'succeeded'] };
+const alone = {
+  queued: ['running'],
+  running: ['succeeded'],
+  pausing: ['paused', 'succeeded'],
+  cancelling: ['cancelled', 'succeeded'],
+};
 const shown = (state) => (state === 'pausing' || state === 'cancelling' ? 'running' : state);
 
 /** {command: {state: [[status, state after], ...]}}. 409 changes nothing. */
 const commands = {
   cancel: {
-    queued: [[202, 'cancelled']], running: [[202, 'cancelling']], pausing: [[202, 'cancelling']], cancelling: [[202, 'cancelling'], [200, 'cancelling']],
-    paused: [[202, 'cancelled']], cancelled: [[200, 'cancelled']], succeeded: [[409, 'succeeded']], failed: [[409, 'failed']],
+    queued: [[202, 'cancelled']],
+    running: [[202, 'cancelling']],
+    pausing: [[202, 'cancelling']],
+    cancelling: [
+      [202, 'cancelling'],
+      [200, 'cancelling'],
+    ],
+    paused: [[202, 'cancelled']],
+    cancelled: [[200, 'cancelled']],
+    succeeded: [[409, 'succeeded']],
+    failed: [[409, 'failed']],
   },
   pause: {
-    queued: [[202, 'paused']], running: [[202, 'pausing']], pausing: [[202, 'pausing'], [200, 'pausing']], cancelling: [[409, 'cancelling']],
-    paused: [[200, 'paused']], cancelled: [[409, 'cancelled']], succeeded: [[409, 'succeeded']], failed: [[409, 'failed']],
+    queued: [[202, 'paused']],
+    running: [[202, 'pausing']],
+    pausing: [
+      [202, 'pausing'],
+      [200, 'pausing'],
+    ],
+    cancelling: [[409, 'cancelling']],
+    paused: [[200, 'paused']],
+    cancelled: [[409, 'cancelled']],
+    succeeded: [[409, 'succeeded']],
+    failed: [[409, 'failed']],
   },
   resume: {
     // A pause under way is waited for, and then resumed; if that takes too long the answer is 200 and the pause stands.
-    queued: [[200, 'queued']], running: [[200, 'running']], pausing: [[202, 'queued'], [200, 'pausing']], cancelling: [[409, 'cancelling']],
-    paused: [[202, 'queued']], cancelled: [[409, 'cancelled']], succeeded: [[409, 'succeeded']], failed: [[409, 'failed']],
+    queued: [[200, 'queued']],
+    running: [[200, 'running']],
+    pausing: [
+      [202, 'queued'],
+      [200, 'pausing'],
+    ],
+    cancelling: [[409, 'cancelling']],
+    paused: [[202, 'queued']],
+    cancelled: [[409, 'cancelled']],
+    succeeded: [[409, 'succeeded']],
+    failed: [[409, 'failed']],
   },
 };
 
@@ -64,7 +96,9 @@ export class Job {
     if (before) assert.ok(json.revision >= before.revision && json.revision <= before.revision + 1, 'a revision grows by one');
   }
 
-  toString() { return `${this.id} {${[...this.states].join(' ')}}`; }
+  toString() {
+    return `${this.id} {${[...this.states].join(' ')}}`;
+  }
 
   narrow(states, what) {
     assert.ok(states.length > 0, `${what}: no state of ${this} allows it`);
@@ -74,7 +108,9 @@ export class Job {
   /** A command was answered. */
   commanded(name, { status, json, text }) {
     const what = `${name} -> ${status} ${status < 300 ? json.state : text}`;
-    let after = [...this.states].flatMap((state) => commands[name][state].filter(([stated]) => stated === status).map(([, next]) => next));
+    let after = [...this.states].flatMap((state) =>
+      commands[name][state].filter(([stated]) => stated === status).map(([, next]) => next),
+    );
     if (status < 300) {
       this.narrow(after, what);
       this.seen(json, what);
@@ -87,18 +123,31 @@ export class Job {
   /** Its whole view, as a look at it or a command gives it. */
   seen(json, what = 'a look') {
     assert.equal(json.id, this.id);
-    this.narrow([...this.states].filter((state) => shown(state) === json.state), `${what}: it is ${json.state}`);
+    this.narrow(
+      [...this.states].filter((state) => shown(state) === json.state),
+      `${what}: it is ${json.state}`,
+    );
     assert.ok(json.last_seq >= this.last, `${what}: event ${this.last} of ${this} was there, now ${json.last_seq}`);
-    if (json.last_seq === this.last && this.digest) assert.equal(json.digest, this.digest, `${what}: the digest of event ${this.last} of ${this}`);
+    if (json.last_seq === this.last && this.digest)
+      assert.equal(json.digest, this.digest, `${what}: the digest of event ${this.last} of ${this}`);
     [this.last, this.digest] = [json.last_seq, json.digest];
-    if (this.ended) assert.ok(isDeepStrictEqual(json, this.ended), `${what}: a finished job changed:\n${JSON.stringify(this.ended)}\n${JSON.stringify(json)}`);
+    if (this.ended)
+      assert.ok(
+        isDeepStrictEqual(json, this.ended),
+        `${what}: a finished job changed:\n${JSON.stringify(this.ended)}\n${JSON.stringify(json)}`,
+      );
     if (terminal.includes(json.state)) this.ended = json;
     if (json.state === 'paused') assert.equal(json.reason, 'user', what);
-    if (this.kind === 'verify' && json.state === 'succeeded') assert.equal(json.result.identical, true, `${what}: ${this} does not find what was grown`);
+    if (this.kind === 'verify' && json.state === 'succeeded')
+      assert.equal(json.result.identical, true, `${what}: ${this} does not find what was grown`);
   }
 
-  get mayBeRemoved() { return [...this.states].some((state) => terminal.includes(state)); }
-  get mayStay() { return [...this.states].some((state) => !terminal.includes(state)); }
+  get mayBeRemoved() {
+    return [...this.states].some((state) => terminal.includes(state));
+  }
+  get mayStay() {
+    return [...this.states].some((state) => !terminal.includes(state));
+  }
 
   /** Events after `after`, complete up to the end of what was stored. */
   history(events, after) {
@@ -115,6 +164,11 @@ export class Job {
       return;
     }
     assert.equal(finished, events.length - 1, `nothing follows the end of ${this}`);
-    this.narrow([...this.states].filter((state) => (last.reason === 'cancelled' ? state === 'cancelled' : state === 'succeeded' || state === 'failed')), `it finished: ${last.reason}`);
+    this.narrow(
+      [...this.states].filter((state) =>
+        last.reason === 'cancelled' ? state === 'cancelled' : state === 'succeeded' || state === 'failed',
+      ),
+      `it finished: ${last.reason}`,
+    );
   }
 }
