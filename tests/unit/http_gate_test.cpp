@@ -192,6 +192,19 @@ TEST(HttpBody, ChunksByteByByteAndTheNextRequestStays) {
   EXPECT_EQ(input, "GET");
 }
 
+// Beast 1.81 asserts (in a build with assertions the process ends) when the last chunk of an empty body comes in pieces.
+TEST(HttpBody, AnEmptyChunkedBodyByteByByte) {
+  RequestHead head;
+  head.chunked = true;
+  for (const std::string bytes : {"0\r\n\r\n", "000\r\n\r\n", "0;a\r\n\r\n", "0\r\nA: b\r\n\r\n"}) {
+    BodyReader reader(head, 10);
+    std::string input;
+    EXPECT_EQ(feed_bytewise(reader, bytes + "GET", input), BodyReader::State::kComplete) << bytes;
+    EXPECT_EQ(input, "GET") << bytes;
+    EXPECT_EQ(reader.take_body(), "") << bytes;
+  }
+}
+
 TEST(HttpBody, RefusesWhatIsTooLargeOrMalformed) {
   const std::string extension(300, 'x');
   const std::string endless(20'000, '0');
