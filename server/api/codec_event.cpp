@@ -11,6 +11,8 @@ Json maybe(const std::optional<T>& value) {
 }
 Json text_or_null(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
 
+Json json_or_null(const std::string& text) { return text.empty() ? Json(nullptr) : Json::parse(text); }
+
 Json woken_list(const std::vector<Woken>& woken) {
   Json list = Json::array();
   for (const Woken& one : woken) {
@@ -112,8 +114,9 @@ Json encode_job(const JobView& view) {
           {"last_seq", job.last_seq},
           {"digest", job.digest.hex()},
           {"engine_version", job.engine_version},
-          {"origin", nullptr},
+          {"origin", json_or_null(job.origin_json)},
           {"spec", Json::parse(job.spec_json)},
+          {"result", json_or_null(job.result_json)},
           {"progress", encode_progress(view.progress)},
           {"links",
            {{"self", self},

@@ -84,6 +84,14 @@ class FailingStore final : public server::Store {
   Result<Submitted> create_job(const server::NewJob& job, std::size_t queued_max) override {
     return real_->create_job(job, queued_max);
   }
+  Result<std::optional<JobRow>> find_submitted(const server::NewJob& job) override { return real_->find_submitted(job); }
+  Result<Submitted> fork_job(const server::NewJob& job, std::int64_t source_key, const server::ForkTail& tail,
+                             std::size_t queued_max, const std::atomic<bool>* stop) override {
+    return real_->fork_job(job, source_key, tail, queued_max, stop);
+  }
+  Result<std::vector<JobRow>> expire_jobs(const server::RetentionLimits& limits, std::int64_t now_ms) override {
+    return real_->expire_jobs(limits, now_ms);
+  }
   Result<JobRow> find_job(const std::string& id) override { return real_->find_job(id); }
   Result<server::JobPage> list_jobs(const server::JobFilter& filter, std::size_t limit,
                                     const std::string& cursor) override {
