@@ -23,7 +23,8 @@ struct Estimate {
   std::string_view basis;  // where the figures come from
 };
 
-Estimate estimate(const RunSpec& spec);
+/// `threads`: on which the job decides.
+Estimate estimate(const RunSpec& spec, int threads = 1);
 Json encode_estimate(const Estimate& estimate);
 
 }  // namespace colony::server::api

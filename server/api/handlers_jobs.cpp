@@ -93,7 +93,7 @@ http::Response post_job(Context& context, const Call& call) {
                                {"name", spec->name},
                                {"labels", labels},
                                {"spec", encode_spec(*spec)},
-                               {"estimate", encode_estimate(estimate(spec->run))}});
+                               {"estimate", encode_estimate(estimate(spec->run, context.config.jobs.threads_per_job))}});
   }
   NewJob job = new_job(*spec);
   job.idempotency_key = *key;

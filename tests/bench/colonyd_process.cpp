@@ -153,6 +153,14 @@ std::map<std::string, double> ColonydProcess::thread_cpu_s() const {
 
 std::uint64_t ColonydProcess::database_bytes() const { return std::filesystem::file_size(data_.path() + "/colony.db"); }
 
+std::uint64_t ColonydProcess::peak_memory_bytes() const {
+  std::ifstream file("/proc/" + std::to_string(pid_) + "/status");
+  for (std::string line; std::getline(file, line);) {
+    if (line.starts_with("VmHWM:")) return 1024 * std::stoull(line.substr(6));
+  }
+  throw std::runtime_error("the process has no peak of memory");
+}
+
 double ColonydProcess::finish() {
   kill(pid_, SIGTERM);
   int status = 0;

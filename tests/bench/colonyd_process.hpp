@@ -30,6 +30,8 @@ class ColonydProcess {
   /// CPU seconds so far of its threads, by name; those that a thread starts bear its name.
   std::map<std::string, double> thread_cpu_s() const;
   std::uint64_t database_bytes() const;
+  /// The most it ever held in memory.
+  std::uint64_t peak_memory_bytes() const;
   /// Ends it by SIGTERM; the CPU seconds of its whole life.
   double finish();
 

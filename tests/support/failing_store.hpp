@@ -52,6 +52,7 @@ class FailingStore final : public server::Store {
   std::function<void()> before_read_events;
   std::function<void(server::JobState, const std::string& reason)> after_set_state;  // that succeeded
   std::function<void()> after_take;                                                  // of a queued job
+  std::function<void(Event&)> tamper;                                                // with each event that is read
   void heal() { appends_until_failure = -1; }
 
   void append_events(server::EventBatch batch, std::function<void(const Status&)> committed) override {
@@ -120,7 +121,11 @@ class FailingStore final : public server::Store {
                                          std::size_t limit) override {
     ++event_reads;
     if (before_read_events) before_read_events();
-    return real_->read_events(job_key, filter, limit);
+    auto events = real_->read_events(job_key, filter, limit);
+    if (events && tamper) {
+      for (Event& event : *events) tamper(event);
+    }
+    return events;
   }
   Result<std::uint64_t> seq_at(std::int64_t job_key, double at_h) override { return real_->seq_at(job_key, at_h); }
   Result<std::vector<SeriesRow>> read_series(std::int64_t job_key) override { return real_->read_series(job_key); }
