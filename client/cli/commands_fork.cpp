@@ -46,7 +46,7 @@ ExitCode fork(Session& session, const ForkOptions& options) {
   for (const std::string& label : options.labels) assignments.push_back(parse_label(label));
   for (const std::string& set : options.sets) assignments.push_back(parse_set(set));
   Json body = Json::object();
-  apply(assignments, body);
+  client::apply(assignments, body);
   const std::string target = job_target(resolve_job_id(session, options.id), "/fork").text();
   const std::string id = post_new_job(session, target, body.dump(), options.key, "forked", options.quiet);
   return options.watch ? watch_job(session, resolve_job_id(session, id)) : ExitCode::kDone;

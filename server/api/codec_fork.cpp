@@ -35,6 +35,7 @@ std::string pointer_of(std::string_view path) {
 
 std::string text_of(double value) { return to_text(Json(value)); }
 
+/// A field whose value is wrong in itself keeps the origin's, and is not accused again.
 void check_fixed(const Params& origin, const Params& params, Errors& errors) {
   for (const ParamInfo& info : param_table()) {
     for (const Fixed& fixed : kFixed) {
@@ -138,12 +139,10 @@ Result<std::vector<Stretch>> stretches_of(const JobRow& job) {
   if (!own) return own.error();
   stretches.push_back({kSeqMax, std::move(*own)});
   const Json origin = job.origin_json.empty() ? Json(nullptr) : Json::parse(job.origin_json);
-  std::uint64_t last = kSeqMax;
   for (const Json* at = &origin; at->is_object(); at = &(*at)["origin"]) {
     auto spec = decode_stored_spec(to_text((*at)["spec"]));
     if (!spec) return spec.error();
-    last = std::min(last, (*at)["at_seq"].get<std::uint64_t>());  // of a fork from before its origin's own beginning
-    stretches.push_back({last, std::move(*spec)});
+    stretches.push_back({(*at)["at_seq"].get<std::uint64_t>(), std::move(*spec)});
   }
   std::reverse(stretches.begin(), stretches.end());
   return stretches;
@@ -178,10 +177,8 @@ Result<ForkSpec> decode_fork(const Json& body, const JobSpec& origin, const Spec
   decode_at(body, fork, errors);
   const std::size_t before = errors.size();
   decode_spec_members(body, limits, fork.job, errors);
-  if (errors.size() == before) {
-    check_fixed(origin.run.params, fork.job.run.params, errors);
-    check_sizes(origin.run.params, fork.job.run.params, errors);
-  }
+  if (errors.size() == before) check_sizes(origin.run.params, fork.job.run.params, errors);
+  check_fixed(origin.run.params, fork.job.run.params, errors);
   if (!errors.empty()) return Error{ErrorCode::kInvalid, kSummary, std::move(errors)};
   return fork;
 }

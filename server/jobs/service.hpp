@@ -66,7 +66,7 @@ struct VerifyTask {
   std::string job_id;
   std::uint64_t to_seq = 0;                // the last event compared; 0: there is none yet
 };
-/// A part of a history that was grown with one spec: up to last_seq, from where the part before ends.
+/// A part of a history that was grown with one spec: from where the part before ends, up to last_seq or to where a later part begins.
 struct Stretch {
   std::uint64_t last_seq = 0;
   RunSpec spec;

@@ -1,5 +1,6 @@
 #include "server/jobs/verifier.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <exception>
 #include <optional>
@@ -105,10 +106,13 @@ RunEnd Verification::compare_all(const JobRow& target) {
   auto stretches = env_.verify.stretches(target);
   if (!stretches) throw std::runtime_error("the stored specs cannot be used: " + stretches.error().message);
   CHECK(!stretches->empty());
-  for (std::size_t i = 0; i < stretches->size(); ++i) {
-    Stretch& stretch = (*stretches)[i];
-    const bool is_last = i + 1 == stretches->size();
-    const std::uint64_t end = is_last ? task_.to_seq : std::min(stretch.last_seq, task_.to_seq);
+  stretches->back().last_seq = task_.to_seq;
+  // A fork may begin before its origin's own beginning: then it has less of the stretches before.
+  for (std::size_t i = stretches->size() - 1; i > 0; --i) {
+    (*stretches)[i - 1].last_seq = std::min((*stretches)[i - 1].last_seq, (*stretches)[i].last_seq);
+  }
+  for (Stretch& stretch : *stretches) {
+    const std::uint64_t end = stretch.last_seq;
     if (seq_ >= end) continue;
     Simulator simulator(std::move(stretch.spec), live_->stop_flag(), env_.config.threads_per_job);
     fold(simulator);

@@ -1,21 +1,15 @@
 // Forks: the copy is the origin's history, what follows is a pure function of the copy and the fork's own spec.
-#include <sqlite3.h>
-
+#include "server/store/connection.hpp"
 #include "tests/unit/jobs_fixture.hpp"
 
 namespace colony::server {
 namespace {
 
-/// Rows of the database beside the running store.
+/// A number from the database, beside the running store.
 std::int64_t ask(const std::string& folder, const std::string& sql) {
-  sqlite3* db = nullptr;
-  EXPECT_EQ(sqlite3_open_v2((folder + "/colony.db").c_str(), &db, SQLITE_OPEN_READWRITE, nullptr), SQLITE_OK);
-  sqlite3_stmt* statement = nullptr;
-  EXPECT_EQ(sqlite3_prepare_v2(db, sql.c_str(), -1, &statement, nullptr), SQLITE_OK) << sql << ": " << sqlite3_errmsg(db);
-  const std::int64_t answer = sqlite3_step(statement) == SQLITE_ROW ? sqlite3_column_int64(statement, 0) : 0;
-  sqlite3_finalize(statement);
-  sqlite3_close(db);
-  return answer;
+  Connection db(folder + "/colony.db", Connection::Access::kReader);
+  Statement question = db.prepare_once(sql);
+  return question.step() ? question.integer(0) : 0;
 }
 
 TEST_F(JobsTest, AForkWithTheSameSpecIsTheSameHistory) {
@@ -149,7 +143,8 @@ TEST_F(JobsTest, ACopyThatIsNotFinishedLeavesNothing) {
   const std::int64_t job_key = service_->show(id)->job.job_key;
   service_.reset();
   store_.reset();
-  ask(dir_.path(), "UPDATE job SET deleted = 2 WHERE job_key = " + std::to_string(job_key));
+  Connection(dir_.path() + "/colony.db", Connection::Access::kWriter)
+      .execute("UPDATE job SET deleted = 2 WHERE job_key = " + std::to_string(job_key));
   open();
   EXPECT_EQ(visible(), 1U);
   EXPECT_EQ(service_->show(id).error().code, ErrorCode::kNotFound);
