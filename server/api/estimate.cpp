@@ -31,6 +31,9 @@ struct Calibration {
   // A move tried looks at its neighbours' surroundings, and is stored with its cell, made or not.
   double wall_per_move_s = 30e-6;
   double stored_per_move_bytes = 500.0;
+  // What the service adds to a cell (writing, announcing), and what a second thread and each further one adds to the speed and costs in CPU.
+  double wall_per_cell_service_s = 60e-6;
+  double speed_per_thread = 0.65;
   // Peak memory of colonyd, and database_MB of colony-service-bench.
   double memory_base_bytes = 30e6;
   double memory_per_cell_bytes = 1500.0;
@@ -48,7 +51,7 @@ double cells_of_colony(const Growth& growth, double cycles) {
 
 }  // namespace
 
-Estimate estimate(const RunSpec& spec) {
+Estimate estimate(const RunSpec& spec, int threads) {
   const Params& p = spec.params;
   const Growth& growth = p.layers == Layers::kMulti ? kMulti : kMono;
   const double founders = p.founders.positions_um.empty() ? static_cast<double>(p.founders.count)
@@ -81,9 +84,10 @@ Estimate estimate(const RunSpec& spec) {
   const double evaluations = static_cast<double>(p.search.population * p.search.points) * (1.0 + generations / 2.0);
   // A colony of linear radius has a third of its last cells on average.
   const double moves = p.motility.rate_per_h * out.time_h * cells / 3.0;
-  out.wall_s = cells * growth.searches_per_cell * kMeasured.wall_per_search_s *
+  const double one_thread_s = cells * growth.searches_per_cell * kMeasured.wall_per_search_s *
                    std::max(kMeasured.evaluations_share_min, evaluations / kMeasured.evaluations_per_search) +
-               moves * kMeasured.wall_per_move_s;
+               moves * kMeasured.wall_per_move_s + cells * kMeasured.wall_per_cell_service_s;
+  out.wall_s = one_thread_s / (1.0 + kMeasured.speed_per_thread * (threads - 1));
   out.memory_bytes = static_cast<std::uint64_t>(kMeasured.memory_base_bytes + cells * kMeasured.memory_per_cell_bytes);
   out.stored_bytes = static_cast<std::uint64_t>(cells * kMeasured.stored_per_cell_bytes + moves * kMeasured.stored_per_move_bytes);
   out.basis = p.layers == Layers::kMulti
