@@ -92,6 +92,8 @@ struct Endpoint {
 };
 
 std::span<const Endpoint> endpoints();
+/// Rows of the table that stand beside their handlers (handlers_fork.cpp).
+std::vector<Endpoint> fork_endpoints();
 
 class Api {
  public:

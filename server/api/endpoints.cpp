@@ -1,4 +1,6 @@
 // The table of operations.
+#include <utility>
+
 #include "engine/picture/mesh.hpp"
 #include "server/api/api.hpp"
 #include "server/api/measure.hpp"
@@ -107,27 +109,6 @@ std::vector<Endpoint> make_endpoints() {
        "Job",
        {kMalformed, kNotFound, kJobTerminal, kUnsupportedMediaType},
        resume_job},
-      {"POST",
-       "/v1/jobs/{job_id}/fork",
-       "forkJob",
-       "A new job that begins with a copy of the history up to a time or an event, and goes on by a spec of its own. Idempotency-Key as for submitJob",
-       {kJson},
-       {},
-       {{200, "the same job as before (same key and body)"}, {201, "the new job"}},
-       "Job",
-       {kMalformed, kNotFound, kTimeNotReached, kEngineChanged, kLimit, kUnsupportedMediaType, kKeyReused, kBusy},
-       fork_job,
-       true},
-      {"POST",
-       "/v1/jobs/{job_id}/verify",
-       "verifyJob",
-       "A job of kind verify: grows what is stored by now again, and compares every event. Idempotency-Key as for submitJob",
-       {kJson},
-       {},
-       {{200, "the same job as before (same key)"}, {201, "the new job"}},
-       "Job",
-       {kMalformed, kNotFound, kEngineChanged, kUnsupportedMediaType, kKeyReused, kBusy},
-       verify_job},
       {"DELETE",
        "/v1/jobs/{job_id}",
        "deleteJob",
@@ -403,7 +384,11 @@ std::vector<Endpoint> make_endpoints() {
 }  // namespace
 
 std::span<const Endpoint> endpoints() {
-  static const std::vector<Endpoint> table = make_endpoints();
+  static const std::vector<Endpoint> table = [] {
+    std::vector<Endpoint> rows = make_endpoints();
+    for (Endpoint& row : fork_endpoints()) rows.push_back(std::move(row));
+    return rows;
+  }();
   return table;
 }
 

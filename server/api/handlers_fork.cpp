@@ -82,4 +82,31 @@ http::Response verify_job(Context& context, const Call& call) {
   return submitted_response(context, submitted->view, submitted->created);
 }
 
+std::vector<Endpoint> fork_endpoints() {
+  using enum ProblemKind;
+  return {
+      {"POST",
+       "/v1/jobs/{job_id}/fork",
+       "forkJob",
+       "A new job that begins with a copy of the history up to a time or an event, and goes on by a spec of its own. Idempotency-Key as for submitJob",
+       {"application/json"},
+       {},
+       {{200, "the same job as before (same key and body)"}, {201, "the new job"}},
+       "Job",
+       {kMalformed, kNotFound, kTimeNotReached, kEngineChanged, kLimit, kUnsupportedMediaType, kKeyReused, kBusy},
+       fork_job,
+       true},
+      {"POST",
+       "/v1/jobs/{job_id}/verify",
+       "verifyJob",
+       "A job of kind verify: grows what is stored by now again, and compares every event. Idempotency-Key as for submitJob",
+       {"application/json"},
+       {},
+       {{200, "the same job as before (same key)"}, {201, "the new job"}},
+       "Job",
+       {kMalformed, kNotFound, kEngineChanged, kUnsupportedMediaType, kKeyReused, kBusy},
+       verify_job},
+  };
+}
+
 }  // namespace colony::server::api
