@@ -1,8 +1,6 @@
 // estimate: what a job will roughly cost, before it runs.
-// Method:  the measured growth law of a lone colony (exponential, then linear radius) in units of the mean cycle,
-// bounded by
-//          the spec; a cost per cell in proportion to the points scored. A guess within a factor of about three, and
-//          said so.
+// Method:  the measured growth law of a lone colony (exponential, then linear radius) in units of the mean cycle, bounded by the spec; a cost
+//          per search and per move. Within a factor of two for the presets (colony-service-bench estimate), and `basis` says so.
 // Threads: pure.
 #pragma once
 
