@@ -362,12 +362,7 @@ std::vector<Endpoint> make_endpoints() {
        "/openapi.json",
        "getOpenapi",
        "This description",
-       {kJson},
-       {},
-       {{200, "the description"}},
-       "",
-       {},
-       get_openapi},
+       {kJson}, {}, {{200, "the description"}}, "", {}, get_openapi},
       {"GET",
        "/v1/service-info",
        "getServiceInfo",
@@ -383,12 +378,7 @@ std::vector<Endpoint> make_endpoints() {
        "/readyz",
        "getReadiness",
        "Ready: database writable, disk free, not draining",
-       {kJson},
-       {},
-       {{200, "ready"}},
-       "Health",
-       {},
-       get_readyz},
+       {kJson}, {}, {{200, "ready"}}, "Health", {}, get_readyz},
   };
 }
 
