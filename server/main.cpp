@@ -15,6 +15,7 @@
 #include <spdlog/spdlog.h>
 
 #include "server/api/api.hpp"
+#include "server/api/codec_fork.hpp"
 #include "server/config.hpp"
 #include "server/http/server.hpp"
 
@@ -86,7 +87,9 @@ int serve(const Config& config) {
   allow_descriptors();
   auto store = Store::open(config.store);
   if (!store) return fail("cannot open the data folder " + config.store.data_dir, store.error());
-  const auto jobs = JobService::create(**store, config.jobs, api::decode_stored_spec);
+  JobsConfig jobs_config = config.jobs;
+  jobs_config.log = [](const std::string& line) { spdlog::info("{}", line); };
+  const auto jobs = JobService::create(**store, jobs_config, api::decode_stored_spec, api::verify_codec());
 
   api::ApiConfig api_config;
   api_config.version = COLONY_VERSION;

@@ -102,6 +102,8 @@ struct Endpoint {
 };
 
 std::span<const Endpoint> endpoints();
+/// Rows of the table that stand beside their handlers (handlers_fork.cpp).
+std::vector<Endpoint> fork_endpoints();
 
 class Api {
  public:
@@ -136,6 +138,8 @@ http::Response get_job(Context& context, const Call& call);
 http::Response cancel_job(Context& context, const Call& call);
 http::Response pause_job(Context& context, const Call& call);
 http::Response resume_job(Context& context, const Call& call);
+http::Response fork_job(Context& context, const Call& call);
+http::Response verify_job(Context& context, const Call& call);
 http::Response delete_job(Context& context, const Call& call);
 http::Response get_events(Context& context, const Call& call);
 http::Response get_cells(Context& context, const Call& call);

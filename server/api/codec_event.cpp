@@ -11,6 +11,8 @@ Json maybe(const std::optional<T>& value) {
 }
 Json text_or_null(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
 
+Json json_or_null(const std::string& text) { return text.empty() ? Json(nullptr) : Json::parse(text); }
+
 Json woken_list(const std::vector<Woken>& woken) {
   Json list = Json::array();
   for (const Woken& one : woken) {
@@ -113,7 +115,8 @@ Json encode_before_spec(const JobRow& job) {
           {"last_seq", job.last_seq},
           {"digest", job.digest.hex()},
           {"engine_version", job.engine_version},
-          {"origin", nullptr}};
+          {"origin", json_or_null(job.origin_json)},
+          {"result", json_or_null(job.result_json)}};
 }
 
 Json encode_after_spec(const JobView& view) {

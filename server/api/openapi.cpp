@@ -96,7 +96,9 @@ Json parameters_of(const Endpoint& endpoint) {
   const auto header = [&](const char* name, const char* text, Json schema) {
     parameters.push_back({{"name", name}, {"in", "header"}, {"description", text}, {"schema", std::move(schema)}});
   };
-  if (endpoint.operation_id == "submitJob") {
+  const bool makes_job =
+      endpoint.operation_id == "submitJob" || endpoint.operation_id == "forkJob" || endpoint.operation_id == "verifyJob";
+  if (makes_job) {
     header("Idempotency-Key", "the same key and body give the same job",
            {{"type", "string"}, {"minLength", 1}, {"maxLength", kIdempotencyKeyBytesMax}, {"pattern", "^[ -~]+$"}});
   }
@@ -132,7 +134,8 @@ Json success_answer(const Endpoint& endpoint, int status, std::string_view descr
   const auto header = [&](const char* name, const char* text) {
     answer["headers"][name] = {{"description", text}, {"schema", {{"type", "string"}}}};
   };
-  if (endpoint.operation_id == "submitJob") header("Location", "path of the job");
+  if (endpoint.operation_id == "submitJob" || endpoint.operation_id == "forkJob" || endpoint.operation_id == "verifyJob")
+    header("Location", "path of the job");
   if (status == 201 || status == 202) {
     if (endpoint.operation_id == "analyseImage" || endpoint.operation_id == "compare") {
       header("Location", "path of what was made");
@@ -182,6 +185,9 @@ Json responses_of(const Endpoint& endpoint) {
 Json request_body_of(const Endpoint& endpoint) {
   if (endpoint.operation_id == "submitJob") {
     return {{"required", true}, {"content", {{"application/json", {{"schema", reference("JobSpec")}}}}}};
+  }
+  if (endpoint.operation_id == "forkJob") {
+    return {{"required", true}, {"content", {{"application/json", {{"schema", reference("ForkSpec")}}}}}};
   }
   if (endpoint.operation_id == "compare") {
     return {{"required", true}, {"content", {{"application/json", {{"schema", reference("ComparisonSpec")}}}}}};

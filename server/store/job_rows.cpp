@@ -154,7 +154,7 @@ std::vector<JobRow> list_job_rows(Connection& connection, const JobFilter& filte
   std::size_t spec_bytes = 0;
   while ((jobs.empty() || spec_bytes <= spec_bytes_max) && row.step()) {
     jobs.push_back(row_at(row));
-    spec_bytes += jobs.back().spec_json.size();
+    spec_bytes += jobs.back().spec_json.size() + jobs.back().origin_json.size();
   }
   for (JobRow& job : jobs) read_labels(connection, job);
   return jobs;
@@ -220,13 +220,22 @@ void update_job_row(Connection& connection, const JobRow& job) {
   to.bind_text_or_null(job.result_json).bind(job.job_key).run();
 }
 
-std::optional<UsedKey> find_used_key(Connection& connection, const NewJob& job) {
+Result<std::optional<JobRow>> find_submitted_row(Connection& connection, const NewJob& job) {
+  if (job.idempotency_key.empty()) return std::optional<JobRow>();
   Statement& row = connection.prepared("SELECT job_key, body_hash FROM idempotency WHERE submitted_by = ? AND key = ?");
   row.bind(std::string_view(job.submitted_by)).bind(std::string_view(job.idempotency_key));
-  if (!row.step()) return std::nullopt;
-  UsedKey used{row.integer(0), row.text(1)};
+  if (!row.step()) return std::optional<JobRow>();
+  const std::int64_t job_key = row.integer(0);
+  const bool is_same = row.text(1) == job.body_hash;
   row.reset();
-  return used;
+  if (!is_same) {
+    return Error{ErrorCode::kKeyReused,
+                 "the idempotency key was used with another body",
+                 {{"Idempotency-Key", "used before with another body"}}};
+  }
+  std::optional<JobRow> same = find_job_row(connection, job_key);
+  CHECK(same.has_value());  // a key goes with its job
+  return same;
 }
 
 void insert_used_key(Connection& connection, const NewJob& job, std::int64_t job_key) {
@@ -257,6 +266,13 @@ std::vector<LogRow> read_log_rows(Connection& connection, std::int64_t job_key, 
   std::vector<LogRow> lines;
   while (row.step()) lines.push_back({row.integer(0), row.text(1), row.text(2), row.text(3), row.text(4)});
   return lines;
+}
+
+void mark_unmade_jobs_deleted(Connection& connection) {
+  Statement unmade = connection.prepare_once("SELECT job_key FROM job WHERE deleted = 2");
+  std::vector<std::int64_t> job_keys;
+  while (unmade.step()) job_keys.push_back(unmade.integer(0));
+  for (const std::int64_t job_key : job_keys) mark_job_deleted(connection, job_key);
 }
 
 void mark_job_deleted(Connection& connection, std::int64_t job_key) {

@@ -161,6 +161,14 @@ std::uint64_t ColonydProcess::resident_bytes() const {
   return resident * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
 }
 
+std::uint64_t ColonydProcess::peak_memory_bytes() const {
+  std::ifstream file("/proc/" + std::to_string(pid_) + "/status");
+  for (std::string line; std::getline(file, line);) {
+    if (line.starts_with("VmHWM:")) return 1024 * std::stoull(line.substr(6));
+  }
+  throw std::runtime_error("the process has no peak of memory");
+}
+
 double ColonydProcess::finish() {
   kill(pid_, SIGTERM);
   int status = 0;

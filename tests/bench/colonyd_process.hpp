@@ -33,6 +33,8 @@ class ColonydProcess {
   /// Resident now.
   std::uint64_t resident_bytes() const;
   std::uint16_t port() const { return port_; }
+  /// The most it ever held in memory.
+  std::uint64_t peak_memory_bytes() const;
   /// Ends it by SIGTERM; the CPU seconds of its whole life.
   double finish();
 

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "engine/base/check.hpp"
+#include "engine/base/version.hpp"
 #include "engine/sim/simulator.hpp"
 #include "server/api/api.hpp"
 #include "server/http/router.hpp"
@@ -40,7 +41,7 @@ class FakeJobs : public JobService {
     row.reason = "cells";
     row.submitted_by = "local";
     row.created_at = row.started_at = row.finished_at = "2026-01-02T03:04:05.678Z";
-    row.engine_version = "0.1.0";
+    row.engine_version = engine_version_text();
     row.last_seq = history.back().seq;
     row.digest = history.back().digest;
     api::JobSpec job_spec;
@@ -82,6 +83,23 @@ class FakeJobs : public JobService {
     submitted.push_back(job);
     return Submitted{view(), true};
   }
+  Result<std::optional<JobView>> submitted_before(const NewJob& job) override {
+    const auto at = keys.find(job.idempotency_key);
+    if (job.idempotency_key.empty() || at == keys.end()) return std::optional<JobView>();
+    if (at->second != job.body_hash) return Error{ErrorCode::kKeyReused, "the key was used with another body"};
+    return std::optional<JobView>(view());
+  }
+  Result<ForkPoint> fork_point(const std::string& id, std::optional<double> at_h,
+                               std::optional<std::uint64_t> at_seq) override {
+    if (id != row.id) return missing(id);
+    std::uint64_t seq = at_seq.value_or(history.back().seq - 1);
+    auto colony = std::make_shared<Colony>(spec.params);
+    for (const Event& event : history) {
+      if (event.seq <= seq && (!at_h || event.time_h <= *at_h)) colony->apply(event);
+    }
+    return ForkPoint{row, colony->last_seq(), {colony, std::make_shared<RunSpec>(spec), colony->time_h(), colony->digest()}};
+  }
+  Result<Submitted> fork(const NewJob& job, const ForkPoint&) override { return submit(job); }
   Result<JobView> show(const std::string& id) override {
     if (id != row.id) return missing(id);
     return view();
