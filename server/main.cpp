@@ -1,6 +1,7 @@
 // colonyd: wires store, jobs, api and http together, and ends them in the opposite order.
 // Exit: 0 after SIGTERM or SIGINT; 1 if it cannot start (data locked, port taken); 2 if the configuration is wrong.
 #include <sched.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <csignal>
@@ -14,6 +15,7 @@
 #include <spdlog/spdlog.h>
 
 #include "server/api/api.hpp"
+#include "server/api/codec_fork.hpp"
 #include "server/config.hpp"
 #include "server/http/server.hpp"
 
@@ -60,6 +62,14 @@ sigset_t block_signals() {
   return set;
 }
 
+// A connection is a descriptor, and the usual soft limit of 1,024 is less than limits of ours allow.
+void allow_descriptors() {
+  rlimit files{};
+  if (getrlimit(RLIMIT_NOFILE, &files) != 0) return;
+  files.rlim_cur = files.rlim_max;
+  setrlimit(RLIMIT_NOFILE, &files);
+}
+
 int wait_for_signal(const sigset_t& set) {
   int signal = 0;
   while (sigwait(&set, &signal) != 0) {
@@ -74,9 +84,12 @@ int fail(const std::string& what, const Error& error) {
 
 int serve(const Config& config) {
   const sigset_t signals = block_signals();
+  allow_descriptors();
   auto store = Store::open(config.store);
   if (!store) return fail("cannot open the data folder " + config.store.data_dir, store.error());
-  const auto jobs = JobService::create(**store, config.jobs, api::decode_stored_spec);
+  JobsConfig jobs_config = config.jobs;
+  jobs_config.log = [](const std::string& line) { spdlog::info("{}", line); };
+  const auto jobs = JobService::create(**store, jobs_config, api::decode_stored_spec, api::verify_codec());
 
   api::ApiConfig api_config;
   api_config.version = COLONY_VERSION;

@@ -58,6 +58,7 @@ int run(const std::vector<std::string>& arguments, Environment& env) {
   app.add_flag("--json", session.json, "Print the server's JSON");
   app.set_version_flag("--version", COLONY_VERSION);
   add_submit_command(app, session, action);
+  add_fork_commands(app, session, action);
   add_watch_command(app, session, action);
   add_job_commands(app, session, action);
   add_data_commands(app, session, action);

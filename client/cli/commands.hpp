@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 
 #include <CLI/App.hpp>
@@ -16,6 +17,7 @@ using Action = std::function<ExitCode()>;
 void add_job_commands(CLI::App& app, Session& session,
                       Action& action);  // list counts show cancel pause resume delete info
 void add_submit_command(CLI::App& app, Session& session, Action& action);
+void add_fork_commands(CLI::App& app, Session& session, Action& action);     // fork verify
 void add_watch_command(CLI::App& app, Session& session, Action& action);
 void add_data_commands(CLI::App& app, Session& session, Action& action);     // events cells log
 void add_picture_commands(CLI::App& app, Session& session, Action& action);  // series image
@@ -23,7 +25,12 @@ void add_measure_commands(CLI::App& app, Session& session, Action& action);  // 
 void add_report_command(CLI::App& app, Session& session, Action& action);
 void add_founders_command(CLI::App& app, Session& session, Action& action);
 
-/// Follows a job to its end. Exit code: kDone, kJobFailed or kCancelled by its state; kInterrupted leaves it running.
+/// POSTs what makes a job, with an idempotency key (a random one if none is given), patiently; prints the job after `verb`. Its id.
+std::string post_new_job(Session& session, const std::string& target, std::string body, const std::optional<std::string>& key,
+                         const char* verb, bool quiet);
+
+/// Follows a job to its end. Exit code: kDone, kJobFailed or kCancelled by its state; kInterrupted leaves it running. A verification
+/// that found a difference is kJobFailed too.
 ExitCode watch_job(Session& session, const std::string& id);
 
 /// An option's text as a number. Failure kUsage naming the option (CLI11 would read "010" as eight).

@@ -75,7 +75,9 @@ ExitCode list_jobs(Session& session, const ListOptions& options) {
 void print_members(std::ostream& out, const Json& object, const std::string& prefix) {
   for (const auto& [key, value] : object.items()) {
     const std::string name = prefix + printable(key);
-    if (value.is_object() && !value.empty()) {
+    if (prefix.starts_with("origin.") && key == "spec") {
+      out << name << ": (--json shows it)\n";
+    } else if (value.is_object() && !value.empty()) {
       print_members(out, value, name + ".");
     } else if (value.is_array() && !value.empty() && value.front().is_object()) {
       out << name << ": ";

@@ -3,6 +3,7 @@
 #include <memory>
 #include <optional>
 #include <random>
+#include <utility>
 
 #include <CLI/CLI.hpp>
 
@@ -81,8 +82,19 @@ ExitCode submit(Session& session, const SubmitOptions& options) {
   request.target = "/v1/jobs";
   request.body = spec_body(session, options);
   if (options.dry_run) return dry_run(session, request);
+  const std::string id = post_new_job(session, request.target, std::move(*request.body), options.key, "submitted", options.quiet);
+  return options.watch ? watch_job(session, resolve_job_id(session, id)) : ExitCode::kDone;
+}
 
-  const std::string key = options.key ? *options.key : random_key();
+}  // namespace
+
+std::string post_new_job(Session& session, const std::string& target, std::string body, const std::optional<std::string>& given_key,
+                         const char* verb, bool quiet) {
+  HttpRequest request;
+  request.method = "POST";
+  request.target = target;
+  request.body = std::move(body);
+  const std::string key = given_key ? *given_key : random_key();
   for (const char c : key) {
     if (c <= ' ' || c >= '\x7f') throw Failure(ExitCode::kUsage, "--idempotency-key: visible ASCII characters only");
   }
@@ -106,17 +118,15 @@ ExitCode submit(Session& session, const SubmitOptions& options) {
   if (id.empty()) throw Failure(ExitCode::kRefused, "the server's answer names no job id");
   if (session.json) {
     session.env.out << job.dump() << '\n';
-  } else if (options.quiet) {
+  } else if (quiet) {
     session.env.out << printable(id) << '\n';
   } else {
-    session.env.out << (response.status == 200 ? "submitted before: " : "submitted: ") << printable(id) << " ("
+    session.env.out << verb << (response.status == 200 ? " before: " : ": ") << printable(id) << " ("
                     << member_text(job, "state") << ")\n";
   }
   flush_out(session.env);
-  return options.watch ? watch_job(session, resolve_job_id(session, id)) : ExitCode::kDone;
+  return id;
 }
-
-}  // namespace
 
 void add_submit_command(CLI::App& app, Session& session, Action& action) {
   auto options = std::make_shared<SubmitOptions>();

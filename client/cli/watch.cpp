@@ -128,8 +128,15 @@ class Watch {
   ExitCode finish(const Json& job) {
     printer_.clear();
     const std::string state = member_text(job, "state");
+    const Json result = job.value("result", Json());
+    const bool is_different = result.is_object() && result.value("identical", true) == false;
     if (session_.json) {
       env_.out << job.dump() << '\n';
+    } else if (result.is_object()) {
+      env_.out << (is_different ? "different" : "identical") << ": "
+               << (is_different ? "event " + member_text(result, "first_differing_seq") + ", " + member_text(result, "message") + "; before it "
+                                : "")
+               << member_text(result, "events") << " events found the same\n";
     } else {
       const Progress progress = progress_from(job.value("progress", Json()));
       const std::string reason = member_text(job, "reason");
@@ -139,7 +146,7 @@ class Watch {
       if (state == "failed" && member_text(job, "detail") != "-")
         env_.err << "error: " << member_text(job, "detail") << '\n';
     }
-    if (state == "succeeded") return ExitCode::kDone;
+    if (state == "succeeded") return is_different ? ExitCode::kJobFailed : ExitCode::kDone;
     return state == "cancelled" ? ExitCode::kCancelled : ExitCode::kJobFailed;
   }
 

@@ -108,7 +108,8 @@ void GeneTables::decode(const Chromosome& chromosome, const PairFrame& frame, st
       body.field.t[i] = -((m[0] * body.centre[0] + m[1] * body.centre[1]) + m[2] * body.centre[2]);
     }
     // In a monolayer the longest axis lies nearly flat; no point is further from the centre than it.
-    body.reach = std::max(std::abs(body.centre[0]), std::abs(body.centre[1])) + noisy_scale_ * std::max({a, b, c});
+    const float away = std::sqrt(body.centre[0] * body.centre[0] + body.centre[1] * body.centre[1]);
+    body.reach = away + noisy_scale_ * std::max({a, b, c});
   }
 }
 

@@ -54,8 +54,9 @@ Scorer::Scorer(const Colony& colony, const Params& params, const SearchTask& tas
     const Body& body = colony.body(id);
     ws_.bodies.push_back(&body);
     const Box& box = body.box();
-    const double gap = std::max({box.low.x() - c.x(), c.x() - box.high.x(), box.low.y() - c.y(), c.y() - box.high.y()});
-    ws_.by_gap.push_back({static_cast<float>(gap), id, &body});
+    const double x = std::max({box.low.x() - c.x(), c.x() - box.high.x(), 0.0});
+    const double y = std::max({box.low.y() - c.y(), c.y() - box.high.y(), 0.0});
+    ws_.by_gap.push_back({static_cast<float>(std::sqrt(x * x + y * y)), id, &body});
   }
   std::sort(ws_.by_gap.begin(), ws_.by_gap.end(), [](const auto& a, const auto& b) { return std::tie(a.gap_um, a.id) < std::tie(b.gap_um, b.id); });
   kernel::SearchScene& scene = ws_.scene;

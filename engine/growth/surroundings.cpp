@@ -21,11 +21,16 @@ Box ball_box(const Vec3& centre_um, double radius_um) {
   return {centre_um - Vec3::Constant(radius_um), centre_um + Vec3::Constant(radius_um)};
 }
 
-// The noise-free body as a cover: its shadow in a monolayer, itself among layers.
-kernel::Cover cover_of(const Body& body, const Vec3& origin_um, bool ball) {
-  const Vec3 centre = body.centre_um() - origin_um;
-  kernel::Cover cover{{static_cast<float>(centre.x()), static_cast<float>(centre.y()), ball ? static_cast<float>(centre.z()) : 0.0F},
-                      0.0F, 0.0F, 0.0F, 0.0F, 0.0F, 0.0F};
+// A body that may cover: its shadow in a monolayer, itself among layers, noise-free. What is the same for every disc is worked out once.
+struct Covering {
+  Box box;
+  Vec3 centre_um;
+  kernel::Cover form;                    // its centre is that of the disc's frame, and still to be filled in
+};
+
+Covering covering_of(const Body& body, bool ball) {
+  Covering covering{body.box(), body.centre_um(), {}};
+  kernel::Cover& cover = covering.form;
   if (ball) {
     const Mat3 form = body.to_unit().transpose() * body.to_unit();
     cover.xx = static_cast<float>(form(0, 0));
@@ -40,7 +45,57 @@ kernel::Cover cover_of(const Body& body, const Vec3& origin_um, bool ball) {
     cover.xy = static_cast<float>(form[1]);
     cover.yy = static_cast<float>(form[2]);
   }
-  return cover;
+  return covering;
+}
+
+Box neighbourhood(const Vec3& centre_um, double radius_um, bool ball) { return ball ? ball_box(centre_um, radius_um) : disc_box(centre_um, radius_um); }
+
+// The bodies as they will be after `change`, of those that now meet `area`.
+std::vector<Covering> coverings(const Colony& colony, const Box& area, const BodyChange& change, bool ball) {
+  std::vector<CellId> ids;
+  colony.cells_meeting(area, ids);
+  std::vector<Covering> found;
+  found.reserve(ids.size() + change.bodies.size());
+  for (const CellId id : ids) {
+    if (!(change.gone && id == *change.gone)) found.push_back(covering_of(colony.body(id), ball));
+  }
+  for (const Body& body : change.bodies) found.push_back(covering_of(body, ball));
+  return found;
+}
+
+// Buffers of one sleeper after the other.
+struct ShareScratch {
+  std::vector<kernel::Cover> covers;
+  PointSet points;
+};
+
+// `bodies`: all that meet the neighbourhood, and any others.
+double free_share_among(std::span<const Covering> bodies, const Params& params, Seed seed, CellId id, const Vec3& centre_um, std::uint32_t ordinal,
+                        ShareScratch& scratch, kernel::CountWork* work) {
+  const double radius = params.wake.free_radius_um;
+  const bool ball = params.layers == Layers::kMulti;
+  const Box area = neighbourhood(centre_um, radius, ball);
+  scratch.covers.clear();
+  for (const Covering& body : bodies) {
+    if (!meets(body.box, area)) continue;
+    kernel::Cover& cover = scratch.covers.emplace_back(body.form);
+    const Vec3 centre = body.centre_um - centre_um;
+    for (int i = 0; i < 3; ++i) cover.centre[i] = i < 2 || ball ? static_cast<float>(centre[i]) : 0.0F;
+  }
+  Stream stream(seed, id, ordinal, Purpose::kFreeShare);
+  const std::array<std::uint32_t, 3> seeds = {stream.next_u32(), stream.next_u32(), stream.next_u32()};
+  PointSet& points = scratch.points;
+  if (ball) {
+    tiled_sobol(kFreeSharePoints, seeds, points);
+  } else {
+    tiled_sobol_plane(kFreeSharePoints, seeds, points);
+    std::fill_n(points.z.begin(), points.size(), 0.5F);  // the height of the centre
+  }
+  const float low_z = ball ? static_cast<float>(-centre_um.z()) : -1.0F;
+  const std::size_t n = kernel::keep_in_ball(static_cast<float>(radius), low_z, points.x.data(), points.y.data(), points.z.data(), points.size());
+  CHECK(n > 0);
+  if (work != nullptr) work->cover_count += n * scratch.covers.size();
+  return static_cast<double>(kernel::count_uncovered(scratch.covers, points.x.data(), points.y.data(), points.z.data(), n)) / static_cast<double>(n);
 }
 
 // In the plane (axis_count 2) or in space (3).
@@ -57,38 +112,10 @@ double distance_um(const Vec3& point, const Box& box, int axis_count) {
 
 double free_share(const Colony& colony, const Params& params, Seed seed, const Cell& cell, std::uint32_t ordinal,
                   const BodyChange& change, kernel::CountWork* work) {
-  const double radius = params.wake.free_radius_um;
   const bool ball = params.layers == Layers::kMulti;
-  std::vector<CellId> ids;
-  colony.cells_meeting(ball ? ball_box(cell.centre_um, radius) : disc_box(cell.centre_um, radius), ids);
-  std::vector<kernel::Cover> covers;
-  covers.reserve(ids.size() + change.bodies.size());
-  for (const CellId id : ids) {
-    if (!(change.gone && id == *change.gone)) covers.push_back(cover_of(colony.body(id), cell.centre_um, ball));
-  }
-  for (const Body& body : change.bodies) covers.push_back(cover_of(body, cell.centre_um, ball));
-
-  Stream stream(seed, cell.id, ordinal, Purpose::kFreeShare);
-  const std::array<std::uint32_t, 3> seeds = {stream.next_u32(), stream.next_u32(), stream.next_u32()};
-  PointSet points;
-  tiled_sobol(kFreeSharePoints, seeds, points);
-  // Those of the square that lie in the disc (of the cube, in the ball above the dish), relative to the centre.
-  const auto r = static_cast<float>(radius);
-  const auto dish_z = static_cast<float>(-cell.centre_um.z());
-  std::size_t n = 0;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const float x = 2.0F * points.x[i] - 1.0F;
-    const float y = 2.0F * points.y[i] - 1.0F;
-    const float z = ball ? 2.0F * points.z[i] - 1.0F : 0.0F;
-    if (!(x * x + y * y + z * z <= 1.0F) || (ball && !(r * z >= dish_z))) continue;
-    points.x[n] = r * x;
-    points.y[n] = r * y;
-    points.z[n] = r * z;
-    ++n;
-  }
-  CHECK(n > 0);
-  if (work != nullptr) work->cover_count += n * covers.size();
-  return static_cast<double>(kernel::count_uncovered(covers, points.x.data(), points.y.data(), points.z.data(), n)) / static_cast<double>(n);
+  const std::vector<Covering> bodies = coverings(colony, neighbourhood(cell.centre_um, params.wake.free_radius_um, ball), change, ball);
+  ShareScratch scratch;
+  return free_share_among(bodies, params, seed, cell.id, cell.centre_um, ordinal, scratch, work);
 }
 
 std::vector<Woken> wake_sleepers(const Colony& colony, const Params& params, Seed seed, double time_h, const BodyChange& change,
@@ -113,15 +140,26 @@ std::vector<Woken> wake_sleepers(const Colony& colony, const Params& params, See
   std::vector<CellId> ids;
   colony.cells_meeting(area, ids);
 
+  std::erase_if(ids, [&](CellId id) {
+    const Cell& cell = colony.cell(id);
+    if (cell.activity != Activity::kPassive || cell.due_h || (change.gone && id == *change.gone)) return true;
+    return std::none_of(changed.begin(), changed.end(), [&](const Box& box) {
+      return distance_um(cell.centre_um, box, ball ? 3 : 2) <= radius;
+    });
+  });
+  if (ids.empty()) return {};
+  // One query for all of them: their discs overlap.
+  Box around = neighbourhood(colony.cell(ids.front()).centre_um, radius, ball);
+  for (const CellId id : ids) {
+    const Box one = neighbourhood(colony.cell(id).centre_um, radius, ball);
+    around = {around.low.cwiseMin(one.low), around.high.cwiseMax(one.high)};
+  }
+  const std::vector<Covering> bodies = coverings(colony, around, change, ball);
+  ShareScratch scratch;
   std::vector<Woken> woken;
   for (const CellId id : ids) {
     const Cell& cell = colony.cell(id);
-    if (cell.activity != Activity::kPassive || cell.due_h || (change.gone && id == *change.gone)) continue;
-    const bool near = std::any_of(changed.begin(), changed.end(), [&](const Box& box) {
-      return distance_um(cell.centre_um, box, ball ? 3 : 2) <= radius;
-    });
-    if (!near) continue;
-    const double share = free_share(colony, params, seed, cell, cell.ordinal, change, work);
+    const double share = free_share_among(bodies, params, seed, id, cell.centre_um, cell.ordinal, scratch, work);
     if (params.wake.rule == WakeRule::kShare && !(share >= *cell.free_share + params.wake.gain)) continue;
     woken.push_back({id, share, time_h + params.wake.retry_h});
   }

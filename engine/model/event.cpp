@@ -11,8 +11,9 @@ namespace {
 constexpr std::array<std::string_view, kEventKindCount> kKindNames = {"founded", "divided",  "inhibited", "settled",
                                                                       "moved",   "senesced", "finished"};
 constexpr std::array<std::string_view, 3> kActivityNames = {"active", "passive", "senescent"};
-constexpr std::array<std::string_view, 8> kReasonNames = {"cells",     "time",  "exhausted", "all_senescent",
-                                                          "cancelled", "limit", "internal",  "engine_changed"};
+constexpr std::array<std::string_view, 11> kReasonNames = {"cells",     "time",  "exhausted", "all_senescent",
+                                                           "cancelled", "limit", "internal",  "engine_changed",
+                                                           "identical", "different", "target_deleted"};
 
 template <class Enum, std::size_t n>
 std::optional<Enum> find_name(const std::array<std::string_view, n>& names, std::string_view name) {

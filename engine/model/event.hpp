@@ -73,7 +73,8 @@ struct Senesced {
 
 /// Why a history ends. The first four are success; the rest are written by the job runner, never by the simulator.
 enum class FinishReason : std::uint8_t {
-  kCells = 0, kTime, kExhausted, kAllSenescent, kCancelled, kLimit, kInternal, kEngineChanged
+  kCells = 0, kTime, kExhausted, kAllSenescent, kCancelled, kLimit, kInternal, kEngineChanged,
+  kIdentical, kDifferent, kTargetDeleted     // of a job that verifies another one
 };
 
 struct Finished {
@@ -102,7 +103,8 @@ std::string_view name_of(EventKind kind);
 std::optional<EventKind> event_kind_from(std::string_view name);
 /// "active", "passive", "senescent".
 std::string_view name_of(Activity activity);
-/// "cells", "time", "exhausted", "all_senescent", "cancelled", "limit", "internal", "engine_changed"; and back.
+/// "cells", "time", "exhausted", "all_senescent", "cancelled", "limit", "internal", "engine_changed", "identical", "different",
+/// "target_deleted"; and back.
 std::string_view name_of(FinishReason reason);
 std::optional<FinishReason> finish_reason_from(std::string_view name);
 

@@ -133,12 +133,16 @@ const Reversed& tiled_points_of(std::uint32_t n) {
   return sets[k];
 }
 
-void scramble(const Reversed& reversed, std::uint32_t first, std::uint32_t n, const std::array<std::uint32_t, 3>& seeds, PointSet& out) {
+void scramble(const Reversed& reversed, std::size_t dimension_count, std::uint32_t n, const std::array<std::uint32_t, 3>& seeds, PointSet& out) {
   out.count = n;
   const std::array<std::vector<float>*, 3> columns = {&out.x, &out.y, &out.z};
   for (std::size_t d = 0; d < 3; ++d) {
     if (columns[d]->size() < n + kScramblePadding) columns[d]->resize(n + kScramblePadding);
-    scramble_column(reversed[d].data() + first, n, seeds[d], columns[d]->data());
+    if (d < dimension_count) {
+      scramble_column(reversed[d].data(), n, seeds[d], columns[d]->data());
+    } else {
+      std::fill_n(columns[d]->begin(), n, 0.0F);
+    }
   }
 }
 
@@ -160,12 +164,17 @@ std::uint32_t owen_scramble(std::uint32_t value, std::uint32_t seed) {
 
 void scrambled_sobol(std::uint32_t n, const std::array<std::uint32_t, 3>& seeds, PointSet& out) {
   CHECK(n >= 1 && n <= kSobolPointsMax && (n & (n - 1)) == 0);
-  scramble(reversed_points(), 0, n, seeds, out);
+  scramble(reversed_points(), 3, n, seeds, out);
 }
 
 void tiled_sobol(std::uint32_t n, const std::array<std::uint32_t, 3>& seeds, PointSet& out) {
   CHECK(n >= 1 && n <= kSobolPointsMax && (n & (n - 1)) == 0);
-  scramble(tiled_points_of(n), 0, n, seeds, out);
+  scramble(tiled_points_of(n), 3, n, seeds, out);
+}
+
+void tiled_sobol_plane(std::uint32_t n, const std::array<std::uint32_t, 3>& seeds, PointSet& out) {
+  CHECK(n >= 1 && n <= kSobolPointsMax && (n & (n - 1)) == 0);
+  scramble(tiled_points_of(n), 2, n, seeds, out);
 }
 
 PointSet scrambled_sobol(std::uint32_t n, Stream& stream) {

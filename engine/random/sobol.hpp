@@ -40,6 +40,8 @@ void scrambled_sobol(std::uint32_t n, const std::array<std::uint32_t, 3>& seeds,
 /// The same points tile by tile: each run of 16 holds the points of one elementary interval of x and y, so that they lie close together
 /// in the unit cube, scrambled or not, and a vector of them is mostly of one opinion about a body.
 void tiled_sobol(std::uint32_t n, const std::array<std::uint32_t, 3>& seeds, PointSet& out);
+/// Their x and y alone; z is 0.
+void tiled_sobol_plane(std::uint32_t n, const std::array<std::uint32_t, 3>& seeds, PointSet& out);
 
 /// The same with the next three words of `stream` as seeds.
 PointSet scrambled_sobol(std::uint32_t n, Stream& stream);

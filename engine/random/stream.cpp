@@ -7,6 +7,7 @@
 
 #include "engine/base/check.hpp"
 #include "engine/base/maths.hpp"
+#include "engine/random/philox_kernel.hpp"
 
 namespace colony {
 
@@ -26,16 +27,18 @@ Stream::Stream(Seed seed, CellId cell, std::uint32_t ordinal, Purpose purpose, s
 }
 
 void Stream::refill() {
-  // Most streams give a few words; from the second block on four are made at once, which keeps the multipliers busy.
-  const int blocks = held_ == 0 ? 1 : 4;
-  for (int k = 0; k < blocks; ++k) {
+  // Most streams give a few words. Those that go on, a search's, use hundreds.
+  const std::uint32_t blocks = held_ == 0 ? 1 : kPhiloxBlocks;
+  CHECK(counter_[3] < 0xffffffffU - blocks);
+  if (blocks == 1) {
     const std::array<std::uint32_t, 4> block = philox4x32_10(counter_, key_);
-    std::copy(block.begin(), block.end(), words_.begin() + 4 * k);
-    ++counter_[3];
-    CHECK(counter_[3] != 0);
+    std::copy(block.begin(), block.end(), words_.begin());
+  } else {
+    philox_blocks(counter_, key_, words_.data());
   }
+  counter_[3] += blocks;
   used_ = 0;
-  held_ = 4 * blocks;
+  held_ = static_cast<int>(4 * blocks);
 }
 
 double Stream::uniform(const Interval& interval) { return interval.low + (interval.high - interval.low) * uniform(); }

@@ -68,7 +68,7 @@ class Stream {
 
   std::array<std::uint32_t, 2> key_;
   std::array<std::uint32_t, 4> counter_;
-  std::array<std::uint32_t, 16> words_;   // not initialised: refill() comes first
+  std::array<std::uint32_t, 64> words_;   // kPhiloxBlocks of them; not initialised: refill() comes first
   int used_ = 0;                          // words given out
   int held_ = 0;                          // words there
 };

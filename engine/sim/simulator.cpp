@@ -104,7 +104,7 @@ std::optional<Event> Simulator::step() {
   }
   if (const std::optional<FinishReason> reason = reason_to_finish()) return finish(*reason);
 
-  if (window_.empty()) window_.refill(colony_, agenda_);
+  if (window_.empty()) window_.refill(agenda_);
   // Nothing that happens makes anything due inside the horizon: so what is in front here is first in the agenda.
   CHECK(window_.first() == agenda_.first());
   if (!window_.first_outcome()) {
@@ -162,7 +162,7 @@ Decision Simulator::decide(const AgendaItem& item, Workspace& workspace) const {
 
 void Simulator::decide_ready() {
   // A small window follows the first item closely; a large one (a dish) is used up by half before the agenda is asked again.
-  if (window_.size() < kRefillBelow) window_.refill(colony_, agenda_);
+  if (window_.size() < kRefillBelow) window_.refill(agenda_);
   const std::size_t count_max = kReadyPerThread * static_cast<std::size_t>(crew_.size());
   std::mutex mutex;  // guards window_ and stopped during the round
   bool stopped = false;

@@ -11,16 +11,6 @@ namespace {
 
 constexpr std::uint64_t kLast = std::uint64_t{1} << 62;
 
-bool is_due(const Colony& colony, const AgendaItem& item) {
-  const Cell& cell = colony.cell(item.cell_id);
-  switch (item.kind) {
-    case DueKind::kSettle: return cell.settle_due_h == item.due_h;
-    case DueKind::kMove: return cell.move_due_h == item.due_h;
-    case DueKind::kDivide: return cell.due_h == item.due_h;
-  }
-  return false;
-}
-
 }  // namespace
 
 Window::Window(const Params& params)
@@ -35,23 +25,17 @@ void Window::clear() {
   horizon_h_ = -std::numeric_limits<double>::infinity();
 }
 
-void Window::refill(const Colony& colony, const Agenda& agenda) {
+void Window::refill(const Agenda& agenda) {
   const double horizon_h = agenda.first().due_h + window_h_;
   if (!(horizon_h > horizon_h_)) return;
   agenda.due_before(horizon_h, due_);
   slots_.erase(slots_.begin(), slots_.begin() + static_cast<std::ptrdiff_t>(first_ - base_));
   base_ = first_;
-  // What is listed is still due, but for what divisions took away, and nothing came between.
+  // What is listed is still due, and nothing came between.
   auto listed = slots_.begin();
-  const auto listed_end = slots_.end();
   auto due = due_.begin();
-  for (; due != due_.end() && due->due_h < horizon_h_; ++due, ++listed) {
-    while (listed != listed_end && listed->item != *due) {
-      CHECK(!is_due(colony, listed->item));
-      ++listed;
-    }
-    CHECK(listed != listed_end);
-  }
+  for (; due != due_.end() && due->due_h < horizon_h_; ++due, ++listed) CHECK(listed != slots_.end() && listed->item == *due);
+  CHECK(listed == slots_.end());
   for (; due != due_.end(); ++due) slots_.push_back({*due, nullptr, kNone, kNone});
   horizon_h_ = horizon_h;
 }
@@ -62,17 +46,6 @@ void Window::pop(const Colony& colony) {
     looked_end_ = first_;
   } else {
     free_those_waiting_for(colony, number);
-  }
-  // Taken away by a division of its cell. It may be decided by now, for nothing.
-  while (!empty() && !is_due(colony, first())) {
-    const Number gone = first_++;
-    if (gone >= looked_end_) {
-      looked_end_ = first_;
-      continue;
-    }
-    std::erase_if(ready_, [&](Number one) { return one % kLast == gone; });
-    std::make_heap(ready_.begin(), ready_.end(), std::greater<>());
-    free_those_waiting_for(colony, gone);
   }
 }
 

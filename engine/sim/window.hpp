@@ -1,7 +1,7 @@
 // window: what is due next, in serial order, and which of it can be decided already.
 // Method:  a sliding horizon: everything due before (first uncommitted due + window_h). Nothing that is committed makes
 //          anything due inside it, because every delay is at least window_h (CHECKed); so the list is the serial order, and
-//          only grows at its end. (A division takes nothing away: the cell that keeps the id keeps its move. pop() allows for it.) Decided items wait in their
+//          only grows at its end. (A division takes nothing away: the cell that keeps the id keeps its move. refill() CHECKs it.) Decided items wait in their
 //          place for their turn.
 // Threads: exclusive: during a round the caller guards every call by one mutex.
 #pragma once
@@ -50,7 +50,7 @@ class Window {
   std::size_t size() const { return static_cast<std::size_t>(end() - first_); }
 
   /// Moves the horizon to the agenda's first item + window_h and appends what is due before. The agenda must not be empty.
-  void refill(const Colony& colony, const Agenda& agenda);
+  void refill(const Agenda& agenda);
 
   /// The next item in serial order, and its outcome: null while undecided.
   const AgendaItem& first() const { return slot(first_).item; }

@@ -174,18 +174,15 @@ bool deformed_contains(const Body& body, std::span<const Body* const> neighbours
 
 namespace {
 
-// Flags in s.flags; the points placed in `box` stand in s.x, s.y, s.z, relative to `origin`.
-void flag_deformed_in(const Box& box, const Vec3& origin, const Body& body, std::span<const Body* const> neighbours, ContactRule rule,
-                      const PointSet& points, OverlapScratch& s) {
+// The points placed in `box` stand in s.x, s.y, s.z, relative to `origin`, the neighbours that can matter in s.bodies.
+void place_among(const Box& box, const Vec3& origin, const Body& body, std::span<const Body* const> neighbours, const PointSet& points,
+                 OverlapScratch& s) {
   Placement placement(box, origin);
   place(placement, points, s);
   s.bodies.clear();
   for (const Body* other : neighbours) {
     if (meets(other->box(), box) && !separated(*other, body)) s.bodies.emplace_back(*other, origin);
   }
-  s.flags.resize(points.size());
-  kernel::flag_deformed(FloatBody(body, origin), s.bodies, rule == ContactRule::kMax, s.x.data(), s.y.data(), s.z.data(), points.size(),
-                        s.flags.data(), &s.work);
 }
 
 }  // namespace
@@ -197,19 +194,15 @@ MassEstimate deformed_mass(const Body& body, std::span<const Body* const> neighb
   mass.centre_um = body.centre_um();
   const Box& box = body.box();
   if (box.empty()) return mass;
-  flag_deformed_in(box, 0.5 * (box.low + box.high), body, neighbours, rule, points, s);
-  // Coordinates of the unit cube have 24 bits: these sums are exact, in any order.
-  double sum[3] = {0.0, 0.0, 0.0};
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const double counts = s.flags[i];
-    mass.hit_count += s.flags[i];
-    sum[0] += counts * static_cast<double>(points.x[i]);
-    sum[1] += counts * static_cast<double>(points.y[i]);
-    sum[2] += counts * static_cast<double>(points.z[i]);
-  }
+  const Vec3 origin = 0.5 * (box.low + box.high);
+  place_among(box, origin, body, neighbours, points, s);
+  const kernel::DeformedSums sums =
+      kernel::sum_deformed(FloatBody(body, origin), s.bodies, rule == ContactRule::kMax, {s.x.data(), s.y.data(), s.z.data()},
+                           {points.x.data(), points.y.data(), points.z.data()}, points.size(), &s.work);
+  mass.hit_count = sums.count;
   mass.volume_um3 = box.volume() * mass.hit_count / static_cast<double>(points.size());
   if (mass.hit_count == 0) return mass;
-  for (int i = 0; i < 3; ++i) mass.centre_um[i] = box.low[i] + (box.high[i] - box.low[i]) * (sum[i] / mass.hit_count);
+  for (int i = 0; i < 3; ++i) mass.centre_um[i] = box.low[i] + (box.high[i] - box.low[i]) * (sums.sum[i] / mass.hit_count);
   return mass;
 }
 
@@ -221,8 +214,9 @@ MassEstimate deformed_mass(const Body& body, std::span<const Body* const> neighb
 std::optional<Vec3> nearest_outside_um(const Box& box, const Vec3& from_um, const Body& body, std::span<const Body* const> neighbours,
                                        ContactRule rule, const PointSet& points, OverlapScratch& s) {
   check_points(points);
-  flag_deformed_in(box, from_um, body, neighbours, rule, points, s);
-  const std::size_t nearest = kernel::nearest_unflagged(s.x.data(), s.y.data(), s.z.data(), points.size(), s.flags.data());
+  place_among(box, from_um, body, neighbours, points, s);
+  const std::size_t nearest = kernel::nearest_outside(FloatBody(body, from_um), s.bodies, rule == ContactRule::kMax,
+                                                      {s.x.data(), s.y.data(), s.z.data()}, points.size(), &s.work);
   if (nearest == points.size()) return std::nullopt;
   return placed_um(box, points, nearest);
 }

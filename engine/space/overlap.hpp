@@ -40,7 +40,6 @@ struct OverlapScratch {
   std::vector<kernel::FloatBody> bodies;
   std::vector<std::size_t> indices;
   std::vector<std::uint32_t> shared;
-  std::vector<std::uint8_t> flags;
   kernel::CountWork work;                      // grows with every call
 };
 

@@ -50,6 +50,13 @@ FloatBody::FloatBody(const Body& body, const Vec3& origin_um) {
   phase = static_cast<float>(p.phase);
   // A little wider than the bound: rounding in the noise must not make the shortcut differ from the full evaluation.
   band = static_cast<float>(body.noise_bound()) * 1.0001F + 1e-5F;
+  // The band is wider than the bound, and the kernels err by some 1e-6 of the coordinates.
+  const Box box = body.box();
+  for (int i = 0; i < 2; ++i) {
+    const double margin = 1e-3 * (box.high[i] - box.low[i]) + 1e-4;
+    low[i] = static_cast<float>(box.low[i] - origin_um[i] - margin);
+    high[i] = static_cast<float>(box.high[i] - origin_um[i] + margin);
+  }
 }
 
 void BandBuffer::hold(std::size_t n) {

@@ -25,6 +25,7 @@ struct FloatBody {
   float q1[3], q2[3];       // phases of the two sines along each axis: the noise offset, reduced to [0, 2 pi)
   float frequency, slower_frequency, amplitude, second_amplitude, phase;
   float band;               // |1 - u^2 - v^2 - w^2| above this: the sign needs no noise
+  float low[2], high[2];    // beyond these along x or y, 1 - u^2 - v^2 - w^2 is below -band as computed: not evaluated there
   FloatBody() = default;    // of no body: to be overwritten
   FloatBody(const Body& body, const Vec3& origin_um);
 };

@@ -104,8 +104,11 @@ std::uint32_t select_kernel(const FloatBody& body, const float* x, const float* 
 }
 
 // Without copying: where the points of a vector lie close together (tiled_sobol), most vectors need no noise.
-HWY_INLINE hn::Mask<D> inside_of(const FloatBody& b, V x, V y, V z, hn::Mask<D> asked, CountWork& work) {
+HWY_INLINE hn::Mask<D> inside_of(const FloatBody& b, V x, V y, V z, hn::Mask<D> real, CountWork& work) {
   const D d;
+  const auto asked = hn::And(real, in_reach(b, x, y));
+  if (hn::AllFalse(d, asked)) return asked;
+  work.field_count += hn::CountTrue(d, asked);
   const V u = row(b.m, b.t[0], x, y, z);
   const V v = row(b.m + 3, b.t[1], x, y, z);
   const V w = row(b.m + 6, b.t[2], x, y, z);
@@ -132,7 +135,6 @@ void count_each_kernel(std::span<const FloatBody> bodies, const float* HWY_RESTR
     }
     counts[j] = static_cast<std::uint32_t>(count);
   }
-  work.field_count += n * bodies.size();
 }
 
 const char* target_kernel() { return hwy::TargetName(HWY_TARGET); }

@@ -38,7 +38,7 @@ inline constexpr std::array<std::uint32_t, 2> kStageSizes = {32, 32};
 struct CandidateBody {
   float axes[9];                        // row-major
   float centre[3];
-  float reach;                          // no point of it is further from the origin along x or y
+  float reach;                          // no point of it is further from the origin in the plane
   FloatBody field;                      // the same body as its sibling's neighbour
 };
 

@@ -1,4 +1,6 @@
 // The vector kernels of pair_kernel.hpp and voxel_kernel.hpp. Compiled once per target; the numbers are the same on each (overlap_kernel.hpp says why).
+#include <bit>
+
 #define HWY_COMPILE_ALL_ATTAINABLE
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "engine/space/pair_simd.cpp"
@@ -104,47 +106,141 @@ PairScore score_pair_kernel(const SearchScene& scene, const std::array<Candidate
   return score;
 }
 
-// Cubes of a body: see voxel_kernel.hpp.
+HWY_INLINE std::uint32_t bits_of(hn::Mask<D> mask) {
+  std::uint8_t bytes[8 + 8] = {0};  // StoreMaskBits may write 8
+  const std::size_t byte_count = hn::StoreMaskBits(D(), mask, bytes);
+  std::uint32_t bits = 0;
+  for (std::size_t byte = 0; byte < byte_count; ++byte) bits |= static_cast<std::uint32_t>(bytes[byte]) << (8 * byte);
+  return bits;
+}
+
+// Cubes whose sign needs the noise, gathered: in a row of a body one in three does, and a vector that holds one pays for all of its lanes.
+class BandCubes {
+ public:
+  BandCubes(const FloatBody& body, std::uint32_t* rows, CountWork& work) : body_(body), rows_(rows), work_(work) {}
+  /// Lane l of the mask is bit first_bit + l of the rows.
+  HWY_INLINE void add(V u, V v, V w, V smooth, hn::Mask<D> mask, std::int32_t first_bit) {
+    const D d;
+    const hn::RebindToSigned<D> integers;
+    hn::StoreU(hn::Compress(u, mask), d, u_ + count_);
+    hn::StoreU(hn::Compress(v, mask), d, v_ + count_);
+    hn::StoreU(hn::Compress(w, mask), d, w_ + count_);
+    hn::StoreU(hn::Compress(smooth, mask), d, smooth_ + count_);
+    const auto lane_bits = hn::Add(lanes_, hn::Set(integers, first_bit));
+    hn::StoreU(hn::BitCast(integers, hn::Compress(hn::BitCast(d, lane_bits), mask)), integers, bit_ + count_);
+    count_ += hn::CountTrue(d, mask);
+    if (count_ > kHeld) decide();
+  }
+  void decide() {
+    const D d;
+    for (std::size_t i = 0; i < count_; i += hn::Lanes(d)) {
+      const V field = hn::Add(hn::LoadU(d, smooth_ + i), noise(body_, hn::LoadU(d, u_ + i), hn::LoadU(d, v_ + i), hn::LoadU(d, w_ + i)));
+      const auto inside = hn::And(hn::Ge(field, hn::Zero(d)), hn::FirstN(d, count_ - i));
+      for (std::uint32_t bits = bits_of(inside); bits != 0; bits &= bits - 1) {
+        const auto bit = static_cast<std::uint32_t>(bit_[i + static_cast<std::size_t>(std::countr_zero(bits))]);
+        rows_[bit / 32] |= 1U << (bit % 32);
+      }
+    }
+    work_.noise_count += count_;
+    count_ = 0;
+  }
+
+ private:
+  static constexpr std::size_t kHeld = 512;
+  static constexpr std::size_t kRoom = kHeld + 2 * kPadding;
+  const FloatBody& body_;
+  std::uint32_t* rows_;
+  CountWork& work_;
+  const hn::Vec<hn::RebindToSigned<D>> lanes_ = hn::Iota(hn::RebindToSigned<D>(), 0);
+  std::size_t count_ = 0;
+  float u_[kRoom], v_[kRoom], w_[kRoom], smooth_[kRoom];
+  std::int32_t bit_[kRoom];
+};
+
+// Cubes of a body: see voxel_kernel.hpp. Of each row only what lies inside the noisy ellipsoid is asked: |p + x e|^2 <= 1 + band solved for x,
+// for a vector of rows at a time. The ellipsoid is widened by a thousandth: a hundred times what single precision may err by.
 void raster_kernel(const FloatBody& body, float edge, std::int32_t nx, std::int32_t ny, std::int32_t nz, std::int32_t words_per_row,
                    std::uint32_t* HWY_RESTRICT rows, CountWork& work) {
   const D d;
   const hn::RebindToSigned<D> integers;
   const auto lanes = static_cast<std::int32_t>(hn::Lanes(d));
+  const V lane_numbers = hn::ConvertTo(d, hn::Iota(integers, 0));  // once: it goes through memory
+  BandCubes band(body, rows, work);
+  const float* m = body.m;
+  const float a = (m[0] * m[0] + m[3] * m[3]) + m[6] * m[6];
+  const V in_edges = constant(1.0F / (a * edge));
+  const V radius2 = constant((1.0F + body.band) * 1.001F);
+  HWY_ALIGN float first[HWY_MAX_BYTES / sizeof(float)];
+  HWY_ALIGN float last[HWY_MAX_BYTES / sizeof(float)];
   for (std::int32_t k = 0; k < nz; ++k) {
     const V z = constant(edge * static_cast<float>(k));
-    for (std::int32_t j = 0; j < ny; ++j) {
-      const V y = constant(edge * static_cast<float>(j));
-      std::uint32_t* words = rows + (k * ny + j) * words_per_row;
-      for (std::int32_t i = 0; i < words_per_row; ++i) words[i] = 0;
-      for (std::int32_t i = 0; i < nx; i += lanes) {
-        const V x = hn::Mul(constant(edge), hn::ConvertTo(d, hn::Iota(integers, i)));
-        const V u = row(body.m, body.t[0], x, y, z);
-        const V v = row(body.m + 3, body.t[1], x, y, z);
-        const V w = row(body.m + 6, body.t[2], x, y, z);
-        const V smooth = smooth_field(u, v, w);
-        const auto near = hn::And(hn::Ge(smooth, constant(-body.band)), hn::FirstN(d, static_cast<std::size_t>(nx - i)));
-        if (hn::AllFalse(d, near)) continue;
-        auto inside = hn::And(near, hn::Gt(smooth, constant(body.band)));
-        const auto undecided = hn::AndNot(inside, near);
-        if (!hn::AllFalse(d, undecided)) {
-          work.noise_count += hn::CountTrue(d, undecided);
-          inside = hn::And(near, hn::Ge(hn::Add(smooth, noise(body, u, v, w)), hn::Zero(d)));
+    for (std::int32_t first_j = 0; first_j < ny; first_j += lanes) {
+      const V ys = hn::Mul(constant(edge), hn::Add(lane_numbers, constant(static_cast<float>(first_j))));
+      const V u0 = row(m, body.t[0], hn::Zero(d), ys, z);
+      const V v0 = row(m + 3, body.t[1], hn::Zero(d), ys, z);
+      const V w0 = row(m + 6, body.t[2], hn::Zero(d), ys, z);
+      const V along = hn::Add(hn::Add(hn::Mul(constant(m[0]), u0), hn::Mul(constant(m[3]), v0)), hn::Mul(constant(m[6]), w0));
+      const V beyond = hn::Sub(hn::Add(hn::Add(hn::Mul(u0, u0), hn::Mul(v0, v0)), hn::Mul(w0, w0)), radius2);
+      const V discriminant = hn::Sub(hn::Mul(along, along), hn::Mul(constant(a), beyond));
+      const auto met = hn::Ge(discriminant, hn::Zero(d));
+      if (hn::AllFalse(d, met)) continue;
+      const V root = hn::Sqrt(hn::IfThenElseZero(met, discriminant));
+      const V low = hn::Mul(hn::Neg(hn::Add(along, root)), in_edges);
+      const V high = hn::Mul(hn::Sub(root, along), in_edges);
+      const V end = constant(static_cast<float>(nx - 1));
+      hn::Store(hn::IfThenElse(hn::Gt(low, hn::Zero(d)), low, hn::Zero(d)), d, first);
+      hn::Store(hn::IfThenElse(met, hn::IfThenElse(hn::Lt(high, end), high, end), constant(-1.0F)), d, last);
+      const std::int32_t row_count = ny - first_j < lanes ? ny - first_j : lanes;
+      for (std::int32_t lane = 0; lane < row_count; ++lane) {
+        if (!(last[lane] >= first[lane])) continue;
+        const auto from = static_cast<std::int32_t>(first[lane]);
+        const auto to = static_cast<std::int32_t>(last[lane]) + 1;
+        const std::int32_t j = first_j + lane;
+        const V y = constant(edge * static_cast<float>(j));
+        const std::int32_t row_at = (k * ny + j) * words_per_row;
+        work.field_count += static_cast<std::uint64_t>(to - from);
+        for (std::int32_t i = from; i < to; i += lanes) {
+          const V x = hn::Mul(constant(edge), hn::Add(lane_numbers, constant(static_cast<float>(i))));
+          const V u = row(m, body.t[0], x, y, z);
+          const V v = row(m + 3, body.t[1], x, y, z);
+          const V w = row(m + 6, body.t[2], x, y, z);
+          const V smooth = smooth_field(u, v, w);
+          const auto near = hn::And(hn::Ge(smooth, constant(-body.band)), hn::FirstN(d, static_cast<std::size_t>(to - i)));
+          const auto inside = hn::And(near, hn::Gt(smooth, constant(body.band)));
+          const std::uint64_t bits = std::uint64_t{bits_of(inside)} << (i % 32);
+          std::uint32_t* words = rows + row_at + i / 32;
+          words[0] |= static_cast<std::uint32_t>(bits);
+          words[1] |= static_cast<std::uint32_t>(bits >> 32);
+          const auto undecided = hn::AndNot(inside, near);
+          if (!hn::AllFalse(d, undecided)) band.add(u, v, w, smooth, undecided, 32 * row_at + i);
         }
-        std::uint8_t bytes[8 + 8] = {0};
-        const std::size_t byte_count = hn::StoreMaskBits(d, inside, bytes);
-        std::uint32_t bits = 0;
-        for (std::size_t byte = 0; byte < byte_count; ++byte) bits |= static_cast<std::uint32_t>(bytes[byte]) << (8 * byte);
-        words[i / 32] |= bits << (i % 32);
       }
     }
   }
-  work.field_count += static_cast<std::uint64_t>(nx) * static_cast<std::uint64_t>(ny) * static_cast<std::uint64_t>(nz);
+  band.decide();
 }
 
 void add_rows_kernel(const RowRange& rows, std::int32_t first_x, std::int32_t n, std::uint8_t* HWY_RESTRICT counts) {
   const hn::CappedTag<std::uint8_t, 32> bytes;
   const std::size_t lanes = hn::Lanes(bytes);
   const auto one = hn::Set(bytes, std::uint8_t{1});
+  const auto add_word = [&](std::uint32_t bits, std::uint8_t* to) {
+    for (std::size_t i = 0; i < 32; i += lanes) {
+      const std::uint64_t part = bits >> i;  // LoadMaskBits may read 8 bytes; lanes may be fewer than a byte's bits
+      const auto mask = hn::LoadMaskBits(bytes, reinterpret_cast<const std::uint8_t*>(&part));
+      const auto before = hn::LoadU(bytes, to + i);
+      hn::StoreU(hn::SaturatedAdd(before, hn::IfThenElseZero(mask, one)), bytes, to + i);
+    }
+  };
+  // Most rasters lie whole in the counts, a word a row; an empty row costs no more than the question whether it is.
+  if (rows.words_per_row == 1 && first_x >= 0 && first_x + 32 <= n) {
+    for (std::int32_t z = 0; z < rows.nz; ++z) {
+      const std::uint32_t* words = rows.words + z * rows.ny;
+      std::uint8_t* to = counts + (z * n + rows.at_y) * n + first_x;
+      for (std::int32_t y = rows.first_y; y < rows.end_y; ++y) add_word(words[y], to + y * n);
+    }
+    return;
+  }
   for (std::int32_t z = 0; z < rows.nz; ++z) {
     for (std::int32_t y = rows.first_y; y < rows.end_y; ++y) {
       const std::uint32_t* words = rows.words + (z * rows.ny + y) * rows.words_per_row;
@@ -157,13 +253,7 @@ void add_rows_kernel(const RowRange& rows, std::int32_t first_x, std::int32_t n,
           x = 0;
         }
         if (x + 32 > n) bits = x < n ? bits & ((1U << (n - x)) - 1U) : 0;
-        if (bits == 0) continue;
-        for (std::size_t i = 0; i < 32; i += lanes) {
-          const std::uint64_t part = bits >> i;  // LoadMaskBits may read 8 bytes; lanes may be fewer than a byte's bits
-          const auto mask = hn::LoadMaskBits(bytes, reinterpret_cast<const std::uint8_t*>(&part));
-          const auto before = hn::LoadU(bytes, row + x + i);
-          hn::StoreU(hn::SaturatedAdd(before, hn::IfThenElseZero(mask, one)), bytes, row + x + i);
-        }
+        if (bits != 0) add_word(bits, row + x);
       }
     }
   }

@@ -8,7 +8,8 @@
 
 namespace colony::kernel {
 
-/// Sets bit i % 32 of word i / 32 of row (k, j) where the point edge * (i, j, k) lies inside `body`; other bits of the words to 0.
+/// Sets bit i % 32 of word i / 32 of row (k, j) where the point edge * (i, j, k) lies inside `body`. The rows, and a word beyond the last, must be
+/// there and 0 before. At most 2^31 bits in all.
 void raster_rows(const FloatBody& body, float edge, std::int32_t nx, std::int32_t ny, std::int32_t nz, std::int32_t words_per_row,
                  std::uint32_t* rows, CountWork* work = nullptr);
 

@@ -3,6 +3,8 @@
 
 #include "engine/base/stop.hpp"
 #include "server/api/analysis_work.hpp"
+#include "server/api/feed.hpp"
+#include "server/api/job_texts.hpp"
 #include "server/api/openapi.hpp"
 #include "server/api/schema.hpp"
 
@@ -42,9 +44,23 @@ http::Response run_endpoint(const Endpoint& endpoint, Context& context, const ht
   }
 }
 
+// A request for a job as it is, without any condition. All others are run, also those that will be refused.
+std::optional<http::Response> answer_now(const Endpoint& endpoint, Context& context, const http::Request& request) {
+  if (!request.query.empty() || request.path_params.size() != 1) return std::nullopt;
+  for (const char* name : {"If-Match", "If-None-Match", "Prefer", "Range"}) {
+    if (request.headers.count(name) > 0) return std::nullopt;
+  }
+  if (!choose_media(request.headers, endpoint.media)) return std::nullopt;
+  const auto text = context.job_texts->find(request.path_params[0]);
+  if (!text) return std::nullopt;
+  return job_answer(*text);
+}
+
 Api::Api(JobService& jobs, ApiConfig config) {
   const SpecLimits limits{config.jobs.cells_max};
   context_ = std::unique_ptr<Context>(new Context{jobs, std::move(config), false, {}, {}});
+  context_->job_texts = std::make_shared<JobTexts>(jobs);
+  context_->feeds = std::make_shared<Feeds>(jobs);
   context_->schema_text = to_text(job_spec_schema(limits));
   context_->openapi_text =
       to_text(openapi_document(endpoints(), limits, context_->config.version, context_->config.base_path));
@@ -75,6 +91,11 @@ void Api::add_routes(http::Router& router) {
                  return run_endpoint(endpoint, *context, request);
                },
                endpoint.is_heavy ? http::Router::Weight::kHeavy : http::Router::Weight::kLight);
+    if (endpoint.handler == &get_job) {
+      router.set_ready("GET", pattern, [&endpoint, context = context_.get()](const http::Request& request) {
+        return answer_now(endpoint, *context, request);
+      });
+    }
   }
 }
 

@@ -8,6 +8,7 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -55,6 +56,9 @@ inline constexpr std::uint32_t kPackingPoints = 1024;               // a cell's 
 /// Placing more founders than this can take long: one submission at a time may.
 inline constexpr std::uint64_t kFoundersPlacedFreely = 1000;
 
+class Feeds;
+class JobTexts;
+
 /// What handlers work with.
 struct Context {
   JobService& jobs;
@@ -64,6 +68,9 @@ struct Context {
   std::string openapi_text;
   std::atomic<bool> places_many{false};  // a submission of many founders is being checked
   std::unique_ptr<AnalysisWorker> worker = {};  // from start() on
+  // Not shared: a unique_ptr would have to know the class here.
+  std::shared_ptr<JobTexts> job_texts = {};  // answers of GET, kept
+  std::shared_ptr<Feeds> feeds = {};         // of the streams, which all end before it
 };
 
 /// A request that has passed the table's checks.
@@ -95,6 +102,8 @@ struct Endpoint {
 };
 
 std::span<const Endpoint> endpoints();
+/// Rows of the table that stand beside their handlers (handlers_fork.cpp).
+std::vector<Endpoint> fork_endpoints();
 
 class Api {
  public:
@@ -115,6 +124,9 @@ class Api {
 /// stopped is answered with 503.
 http::Response run_endpoint(const Endpoint& endpoint, Context& context, const http::Request& request);
 
+/// The answer of an endpoint that is known without asking a store; nullopt: run it. For an I/O thread.
+std::optional<http::Response> answer_now(const Endpoint& endpoint, Context& context, const http::Request& request);
+
 http::Response json_response(int status, const Json& body);
 http::Response failure(const Error& error, const Call& call);
 
@@ -126,6 +138,8 @@ http::Response get_job(Context& context, const Call& call);
 http::Response cancel_job(Context& context, const Call& call);
 http::Response pause_job(Context& context, const Call& call);
 http::Response resume_job(Context& context, const Call& call);
+http::Response fork_job(Context& context, const Call& call);
+http::Response verify_job(Context& context, const Call& call);
 http::Response delete_job(Context& context, const Call& call);
 http::Response get_events(Context& context, const Call& call);
 http::Response get_cells(Context& context, const Call& call);
@@ -135,6 +149,8 @@ http::Response get_mesh(Context& context, const Call& call);
 http::Response get_analysis_of_job(Context& context, const Call& call);
 http::Response get_image(Context& context, const Call& call);
 http::Response get_log(Context& context, const Call& call);
+/// What POST /v1/analyses takes in its query; they stand where they are read.
+std::vector<QueryParam> analysis_params();
 http::Response post_analysis(Context& context, const Call& call);
 http::Response get_analyses(Context& context, const Call& call);
 http::Response get_analysis(Context& context, const Call& call);

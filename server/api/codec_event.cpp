@@ -11,6 +11,8 @@ Json maybe(const std::optional<T>& value) {
 }
 Json text_or_null(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
 
+Json json_or_null(const std::string& text) { return text.empty() ? Json(nullptr) : Json::parse(text); }
+
 Json woken_list(const std::vector<Woken>& woken) {
   Json list = Json::array();
   for (const Woken& one : woken) {
@@ -91,11 +93,12 @@ Json encode_progress(const Progress& progress) {
           {"eta_s", maybe(progress.eta_s)}};
 }
 
-Json encode_job(const JobView& view) {
-  const JobRow& job = view.job;
+namespace {
+
+// A job but for its spec, which is stored as the text it is answered with: what stands before it, and what after.
+Json encode_before_spec(const JobRow& job) {
   Json labels = Json::object();
   for (const auto& [key, value] : job.labels) labels[key] = value;
-  const std::string self = "/v1/jobs/" + job.id;
   return {{"id", job.id},
           {"kind", job.kind},
           {"name", job.name},
@@ -112,9 +115,13 @@ Json encode_job(const JobView& view) {
           {"last_seq", job.last_seq},
           {"digest", job.digest.hex()},
           {"engine_version", job.engine_version},
-          {"origin", nullptr},
-          {"spec", Json::parse(job.spec_json)},
-          {"progress", encode_progress(view.progress)},
+          {"origin", json_or_null(job.origin_json)},
+          {"result", json_or_null(job.result_json)}};
+}
+
+Json encode_after_spec(const JobView& view) {
+  const std::string self = "/v1/jobs/" + view.job.id;
+  return {{"progress", encode_progress(view.progress)},
           {"links",
            {{"self", self},
             {"events", self + "/events"},
@@ -125,6 +132,24 @@ Json encode_job(const JobView& view) {
             {"analysis", self + "/analysis"},
             {"lineage", self + "/lineage"},
             {"log", self + "/log"}}}};
+}
+
+}  // namespace
+
+Json encode_job(const JobView& view) {
+  Json out = encode_before_spec(view.job);
+  out["spec"] = Json::parse(view.job.spec_json);
+  out.update(encode_after_spec(view));
+  return out;
+}
+
+void append_job_text(std::string& out, const JobView& view) {
+  out += to_text(encode_before_spec(view.job));
+  out.back() = ',';
+  (out += "\"spec\":") += view.job.spec_json;
+  const std::size_t joint = out.size();
+  out += to_text(encode_after_spec(view));
+  out[joint] = ',';
 }
 
 Json encode_log_row(const LogRow& row) {

@@ -27,6 +27,8 @@ Json encode_cell(const Cell& cell);
 Json encode_event(const Event& event);
 Json encode_progress(const Progress& progress);
 Json encode_job(const JobView& view);
+/// The text of encode_job. Its spec is not read: it is stored in the form in which it is answered.
+void append_job_text(std::string& out, const JobView& view);
 Json encode_log_row(const LogRow& row);
 
 }  // namespace colony::server::api

@@ -114,6 +114,18 @@ void check_founder_count(const RunSpec& run, const SpecLimits& limits, Errors& e
   }
 }
 
+void decode_members(const Json& body, const SpecLimits& limits, JobSpec& spec, Errors& errors) {
+  const auto member = [&](const char* name) -> const Json* {
+    const auto found = body.find(name);
+    return found == body.end() ? nullptr : &*found;
+  };
+  if (const Json* json = member("name")) decode_name(*json, spec, errors);
+  if (const Json* json = member("labels")) decode_labels(*json, spec, errors);
+  if (const Json* json = member("seed")) decode_seed(*json, spec, errors);
+  decode_until(member("until"), limits, spec, errors);
+  if (const Json* json = member("model")) decode_model(*json, "/model", spec.run.params, errors);
+}
+
 // `limits` absent: a stored spec.
 Result<JobSpec> decode(const Json& body, const SpecLimits* limits) {
   if (!body.is_object()) return Error{ErrorCode::kInvalid, kSummary, {{"", "must be an object"}}};
@@ -121,20 +133,11 @@ Result<JobSpec> decode(const Json& body, const SpecLimits* limits) {
   spec.run.seed = kSeedDefault;
   spec.run.params = *preset(kPresetDefault);
   Errors errors;
-  const auto member = [&](const char* name) -> const Json* {
-    const auto found = body.find(name);
-    return found == body.end() ? nullptr : &*found;
-  };
   check_names(body, "", kSpecNames, errors);
-  if (const Json* json = member("name")) decode_name(*json, spec, errors);
-  if (const Json* json = member("labels")) decode_labels(*json, spec, errors);
-  if (const Json* json = member("seed")) decode_seed(*json, spec, errors);
-  if (const Json* json = member("preset")) decode_preset(*json, spec, errors);
-  decode_until(member("until"), limits == nullptr ? SpecLimits{} : *limits, spec, errors);
-
-  const std::size_t before_model = errors.size();
-  if (const Json* json = member("model")) decode_model(*json, "/model", spec.run.params, errors);
-  if (limits != nullptr && errors.size() == before_model) check_founder_count(spec.run, *limits, errors);
+  if (const auto json = body.find("preset"); json != body.end()) decode_preset(*json, spec, errors);  // the model is over it
+  decode_members(body, limits == nullptr ? SpecLimits{} : *limits, spec, errors);
+  const auto in_model = [](const FieldError& error) { return error.pointer.starts_with("/model"); };
+  if (limits != nullptr && std::none_of(errors.begin(), errors.end(), in_model)) check_founder_count(spec.run, *limits, errors);
   if (!errors.empty()) return Error{ErrorCode::kInvalid, kSummary, std::move(errors)};
   return spec;
 }
@@ -179,10 +182,22 @@ Json encode_spec(const JobSpec& spec) {
   return {{"seed", spec.run.seed}, {"preset", spec.preset}, {"until", until}, {"model", encode_model(spec.run.params)}};
 }
 
-Result<RunSpec> decode_stored_spec(const std::string& spec_json) {
+Result<JobSpec> decode_stored_job_spec(const std::string& spec_json) {
   const auto json = parse_json(spec_json);
   if (!json) return json.error();
-  auto spec = decode(*json, nullptr);
+  return decode(*json, nullptr);
+}
+
+void decode_spec_members(const Json& body, const SpecLimits& limits, JobSpec& spec, std::vector<FieldError>& errors) {
+  decode_members(body, limits, spec, errors);
+}
+
+void check_spec_names(const Json& body, std::span<const std::string_view> known, std::vector<FieldError>& errors) {
+  check_names(body, "", known, errors);
+}
+
+Result<RunSpec> decode_stored_spec(const std::string& spec_json) {
+  auto spec = decode_stored_job_spec(spec_json);
   if (!spec) return spec.error();
   return std::move(spec->run);
 }

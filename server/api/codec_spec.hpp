@@ -10,7 +10,10 @@
 
 #include <cstdint>
 #include <map>
+#include <span>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "engine/model/params.hpp"
 #include "engine/sim/simulator.hpp"
@@ -52,6 +55,15 @@ Json encode_spec(const JobSpec& spec);
 /// A stored spec, for the runner (jobs/ has no JSON). It was held to the limits of its day and is not held to today's;
 /// its founders are not placed.
 Result<RunSpec> decode_stored_spec(const std::string& spec_json);
+
+/// The same with what a fork takes over.
+Result<JobSpec> decode_stored_job_spec(const std::string& spec_json);
+
+/// The members that a fork has in common with a spec (name, labels, seed, until, model), over what `spec` holds; `until` is required and
+/// taken from the body alone. Founders are not counted. The body is an object.
+void decode_spec_members(const Json& body, const SpecLimits& limits, JobSpec& spec, std::vector<FieldError>& errors);
+/// An error for each member of the object that is none of `known`.
+void check_spec_names(const Json& body, std::span<const std::string_view> known, std::vector<FieldError>& errors);
 
 /// What the store keeps of a spec.
 NewJob new_job(const JobSpec& spec);

@@ -84,7 +84,7 @@ Json event_union() {
                         event_schema(EventKind::kSettled, settled),
                         moved,
                         event_schema(EventKind::kSenesced, Json::object()),
-                        event_schema(EventKind::kFinished, {{"reason", names_upto(FinishReason::kEngineChanged)},
+                        event_schema(EventKind::kFinished, {{"reason", names_upto(FinishReason::kTargetDeleted)},
                                                             {"cell_count", count()}})})}};
 }
 
@@ -97,6 +97,34 @@ Json spec_schema(const SpecLimits& limits) {
                         {"preset", typed("string")},
                         {"until", std::move(until)},
                         {"model", model_schema(true)}});
+}
+
+Json or_null(std::string_view component) {
+  return {{"oneOf", Json::array({reference(component), typed("null")})}};
+}
+
+Json origin_schema() {
+  Json schema = strict_object(
+      {{"job_id", job_id()}, {"at_seq", {{"type", "integer"}, {"minimum", 1}}}, {"spec", reference("Spec")}, {"origin", or_null("Origin")}});
+  schema["description"] = "where the first at_seq events of a fork were grown, and by which spec; the job may be gone since";
+  return schema;
+}
+
+Json verify_result_schema() {
+  Json seq = {{"type", Json::array({"integer", "null"})}, {"minimum", 1}};
+  Json digest_or_null = digest();
+  digest_or_null["type"] = Json::array({"string", "null"});
+  Json expected = digest_or_null, actual = digest_or_null;
+  expected["description"] = "of the event as made again";
+  actual["description"] = "of the event as stored; null: it is missing or cannot be read";
+  Json schema = strict_object({{"identical", typed("boolean")},
+                               {"events", count()},
+                               {"first_differing_seq", std::move(seq)},
+                               {"expected_digest", std::move(expected)},
+                               {"actual_digest", std::move(actual)},
+                               {"message", nullable("string")}});
+  schema["properties"]["events"]["description"] = "found identical, from the first on";
+  return schema;
 }
 
 Json job_schema() {
@@ -117,8 +145,9 @@ Json job_schema() {
        {"last_seq", count()},
        {"digest", digest()},
        {"engine_version", typed("string")},
-       {"origin", typed("null")},
-       {"spec", reference("Spec")},
+       {"origin", or_null("Origin")},
+       {"spec", {{"oneOf", Json::array({reference("Spec"), reference("VerifySpec")})}}},
+       {"result", or_null("VerifyResult")},
        {"progress", reference("Progress")},
        {"links",
         strict_object(
@@ -228,6 +257,10 @@ Json component_schemas(const SpecLimits& limits) {
   Json components = {
       {"JobSpec", std::move(job_spec)},
       {"Spec", spec_schema(limits)},
+      {"ForkSpec", fork_spec_schema(limits)},
+      {"VerifySpec", strict_object({{"job_id", job_id()}, {"to_seq", count()}})},
+      {"VerifyResult", verify_result_schema()},
+      {"Origin", origin_schema()},
       {"Job", job_schema()},
       {"Submission", submission_schema()},
       {"JobList", page_of("Job", nullable("string"))},

@@ -1,4 +1,6 @@
 // The table of operations.
+#include <utility>
+
 #include "engine/picture/mesh.hpp"
 #include "server/api/api.hpp"
 #include "server/api/measure.hpp"
@@ -7,7 +9,6 @@ namespace colony::server::api {
 namespace {
 
 constexpr double kSeqMax = 9e15;
-constexpr double kObjectAreaMax_px = kImageSideMax_px * kImageSideMax_px;
 constexpr std::string_view kJson = "application/json";
 constexpr std::string_view kNdjson = "application/x-ndjson";
 constexpr std::string_view kCsv = "text/csv";
@@ -229,20 +230,7 @@ std::vector<Endpoint> make_endpoints() {
        "analyseImage",
        "Analyse a picture: the body is a PNG, TIFF or JPEG. Up to 4,000,000 pixels the answer has the result, beyond it is made later",
        {kJson},
-       {{"name", QueryType::kText, 0, 0, {}, "a name for people"},
-        {"um_per_px", QueryType::kNumber, kImageScaleMin_um_per_px, kImageScaleMax_um_per_px, {},
-         "size of a pixel; without it lengths are in pixels"},
-        {"foreground", QueryType::kName, 0, 0, {"auto", "light", "dark"}, "what the objects are; default auto"},
-        {"channel", QueryType::kInteger, 0, 15, {}, "from 0; an image of several channels needs one"},
-        {"threshold", QueryType::kInteger, 0, 254, {}, "of the step `signal`; default by Otsu"},
-        {"pipeline", QueryType::kName, 0, 0, {"auto", "nuclei", "phase", "contours"}, "default auto"},
-        {"clahe", QueryType::kBoolean, 0, 0, {}, "even the local contrast first; default false"},
-        {"split", QueryType::kBoolean, 0, 0, {}, "nuclei: part touching objects; default true"},
-        {"area_min_px", QueryType::kInteger, 1, kObjectAreaMax_px, {}, "the smallest object; default by the picture"},
-        {"hole_max_px", QueryType::kInteger, 0, kObjectAreaMax_px, {}, "the largest hole that is filled; default by the picture"},
-        {"background_reach_px", QueryType::kInteger, 3, kImageSideMax_px, {},
-         "nuclei: wider than any object; default a quarter of the shorter side"},
-        {"window_radius_px", QueryType::kInteger, 1, 50, {}, "phase: of the local deviation; default 3"}},
+       analysis_params(),
        {{201, "the analysis with its result"}, {202, "the analysis, to be worked on"}},
        "Analysis",
        {kMalformed, kUnsupportedMediaType, kLimit, kBusy},
@@ -367,12 +355,7 @@ std::vector<Endpoint> make_endpoints() {
        "/openapi.json",
        "getOpenapi",
        "This description",
-       {kJson},
-       {},
-       {{200, "the description"}},
-       "",
-       {},
-       get_openapi},
+       {kJson}, {}, {{200, "the description"}}, "", {}, get_openapi},
       {"GET",
        "/v1/service-info",
        "getServiceInfo",
@@ -388,19 +371,18 @@ std::vector<Endpoint> make_endpoints() {
        "/readyz",
        "getReadiness",
        "Ready: database writable, disk free, not draining",
-       {kJson},
-       {},
-       {{200, "ready"}},
-       "Health",
-       {},
-       get_readyz},
+       {kJson}, {}, {{200, "ready"}}, "Health", {}, get_readyz},
   };
 }
 
 }  // namespace
 
 std::span<const Endpoint> endpoints() {
-  static const std::vector<Endpoint> table = make_endpoints();
+  static const std::vector<Endpoint> table = [] {
+    std::vector<Endpoint> rows = make_endpoints();
+    for (Endpoint& row : fork_endpoints()) rows.push_back(std::move(row));
+    return rows;
+  }();
   return table;
 }
 

@@ -20,23 +20,39 @@ struct Growth {
 constexpr Growth kMono = {12.0, 0.75, 0.81, 0.009, 2.4};
 // Preset tumour: 13 cells at 47 h, 63 at 94 h, 316 at 205 h, 1,066 at 361 h, 5,000 at 726 h; about 2,070 at the end for g = 40.
 constexpr Growth kMulti = {12.0, 1.15, 1.14, 0.020, 4.5};
+// Moves make room: preset young-colony (0.1 1/h) has 2,000 cells at 471 h.
+constexpr double kMoveRate_per_h = 0.1, kMoveRootGain = 0.41;
 
-/// What is measured, and nothing else: to recalibrate, grow the presets and put the new figures here and above.
+/// What is measured, and nothing else: to recalibrate, run colony-service-bench estimate and put the new figures here and above.
 struct Calibration {
-  // colony-bench, one thread, about the same with layers: wall_s / divisions / searches_per_division at the evaluations (candidate
-  // pairs times points) that a search of preset `paper` is allowed by the formula below.
+  // CPU time on one thread, about the same with layers: so much a search at the evaluations (candidate pairs times points) that one of preset
+  // `paper` is allowed by the formula below. Searches end early, so it grows with their root only, from a fixed part on.
   double wall_per_search_s = 0.18e-3;
-  double evaluations_per_search = 32.0 * 8.0 * 256.0;
-  double evaluations_share_min = 0.1;  // a search of no evaluations has this part of the cost all the same
+  double evaluations_per_search = 32.0 * 9.0 * 256.0;
+  double fixed_share = 0.35;
+  double searches_per_young_cell = 0.7;  // while a colony grows exponentially: one a division, and found at once
   // A move tried looks at its neighbours' surroundings, and is stored with its cell, made or not.
-  double wall_per_move_s = 30e-6;
-  double stored_per_move_bytes = 500.0;
-  // Peak memory of colonyd, and database_MB of colony-service-bench.
-  double memory_base_bytes = 30e6;
-  double memory_per_cell_bytes = 1500.0;
-  double stored_per_cell_bytes = 1500.0;
+  double wall_per_move_s = 65e-6;
+  double stored_per_move_bytes = 400.0;
+  // What the service adds to a cell (writing, announcing), and each further thread to the speed of the first.
+  double wall_per_cell_service_s = 60e-6;
+  double speed_per_thread = 0.65;
+  // Peak memory of colonyd: itself, the colony, and what SQLite keeps of the pages it writes.
+  double memory_base_bytes = 22e6;
+  double memory_per_thread_bytes = 2e6;
+  double memory_per_cell_bytes = 480.0;
+  double memory_per_stored_byte = 1.8;
+  double memory_of_pages_max_bytes = 80e6;
+  double stored_base_bytes = 80e3;
+  double stored_per_cell_bytes = 1200.0;
 };
 constexpr Calibration kMeasured;
+
+Growth growth_of(const Params& p) {
+  Growth growth = p.layers == Layers::kMulti ? kMulti : kMono;
+  growth.root_gain_per_cycle += kMoveRootGain * std::min(1.0, p.motility.rate_per_h / kMoveRate_per_h);
+  return growth;
+}
 
 double cells_of_colony(const Growth& growth, double cycles) {
   const double exponential_cycles = std::log2(growth.cells_exponential);
@@ -48,9 +64,9 @@ double cells_of_colony(const Growth& growth, double cycles) {
 
 }  // namespace
 
-Estimate estimate(const RunSpec& spec) {
+Estimate estimate(const RunSpec& spec, int threads) {
   const Params& p = spec.params;
-  const Growth& growth = p.layers == Layers::kMulti ? kMulti : kMono;
+  const Growth growth = growth_of(p);
   const double founders = p.founders.positions_um.empty() ? static_cast<double>(p.founders.count)
                                                           : static_cast<double>(p.founders.positions_um.size());
   double ceiling = static_cast<double>(spec.until.cells.value_or(std::uint64_t{1} << 32));
@@ -79,18 +95,27 @@ Estimate estimate(const RunSpec& spec) {
   out.cells = static_cast<std::uint64_t>(std::llround(cells));
   const double generations = static_cast<double>(p.search.generations + p.search.corrector_generations);
   const double evaluations = static_cast<double>(p.search.population * p.search.points) * (1.0 + generations / 2.0);
+  const double search_s =
+      kMeasured.wall_per_search_s *
+      (kMeasured.fixed_share + (1.0 - kMeasured.fixed_share) * std::sqrt(evaluations / kMeasured.evaluations_per_search));
+  // Of each colony the first cells are young ones.
+  const double young = p.division.inhibition ? std::min(cells, founders * growth.cells_exponential) : cells;
+  const double searches = young * kMeasured.searches_per_young_cell + (cells - young) * growth.searches_per_cell;
   // A colony of linear radius has a third of its last cells on average.
   const double moves = p.motility.rate_per_h * out.time_h * cells / 3.0;
-  out.wall_s = cells * growth.searches_per_cell * kMeasured.wall_per_search_s *
-                   std::max(kMeasured.evaluations_share_min, evaluations / kMeasured.evaluations_per_search) +
-               moves * kMeasured.wall_per_move_s;
-  out.memory_bytes = static_cast<std::uint64_t>(kMeasured.memory_base_bytes + cells * kMeasured.memory_per_cell_bytes);
-  out.stored_bytes = static_cast<std::uint64_t>(cells * kMeasured.stored_per_cell_bytes + moves * kMeasured.stored_per_move_bytes);
+  const double one_thread_s =
+      searches * search_s + moves * kMeasured.wall_per_move_s + cells * kMeasured.wall_per_cell_service_s;
+  out.wall_s = one_thread_s / (1.0 + kMeasured.speed_per_thread * (threads - 1));
+  const double stored = kMeasured.stored_base_bytes + cells * kMeasured.stored_per_cell_bytes + moves * kMeasured.stored_per_move_bytes;
+  out.stored_bytes = static_cast<std::uint64_t>(stored);
+  out.memory_bytes = static_cast<std::uint64_t>(
+      kMeasured.memory_base_bytes + kMeasured.memory_per_thread_bytes * threads + cells * kMeasured.memory_per_cell_bytes +
+      std::min(stored * kMeasured.memory_per_stored_byte, kMeasured.memory_of_pages_max_bytes));
   out.basis = p.layers == Layers::kMulti
-                  ? "growth law of preset tumour (doubling, then linear radius) scaled by cycle.mean_h; fixed cost per search on one "
-                    "core of 2024; expect a factor of three either way, more for unusual models"
-                  : "growth law of preset paper (doubling, then linear radius) scaled by cycle.mean_h; fixed cost per search on one "
-                    "core of 2024; expect a factor of three either way, more for unusual models";
+                  ? "growth law of preset tumour (doubling, then linear radius) scaled by cycle.mean_h; cost of searches on cores of 2024, "
+                    "nothing else running; within a factor of 2 for presets, more for unusual models or poor searches"
+                  : "growth law of preset paper (doubling, then linear radius) scaled by cycle.mean_h, faster with moves; cost of searches on "
+                    "cores of 2024, nothing else running; within a factor of 2 for presets, more for unusual models or poor searches";
   return out;
 }
 

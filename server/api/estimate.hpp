@@ -1,8 +1,6 @@
 // estimate: what a job will roughly cost, before it runs.
-// Method:  the measured growth law of a lone colony (exponential, then linear radius) in units of the mean cycle,
-// bounded by
-//          the spec; a cost per cell in proportion to the points scored. A guess within a factor of about three, and
-//          said so.
+// Method:  the measured growth law of a lone colony (exponential, then linear radius) in units of the mean cycle, bounded by the spec; a cost
+//          per search and per move. Within a factor of two for the presets (colony-service-bench estimate), and `basis` says so.
 // Threads: pure.
 #pragma once
 
@@ -23,7 +21,8 @@ struct Estimate {
   std::string_view basis;  // where the figures come from
 };
 
-Estimate estimate(const RunSpec& spec);
+/// `threads`: on which the job decides.
+Estimate estimate(const RunSpec& spec, int threads = 1);
 Json encode_estimate(const Estimate& estimate);
 
 }  // namespace colony::server::api

@@ -125,19 +125,24 @@ struct AppendBody {
   }
 };
 
-}  // namespace
-
-void append_cell_text(std::string& out, const Cell& cell) {
+template <class Row>
+void append_row(std::string& out, std::span<const Column<Row>> columns, const Row& row) {
   char separator = '{';
-  for (const Column<Cell>& column : cell_columns()) {
+  for (const Column<Row>& column : columns) {
     out += separator;
     append_name(out, column.name);
     out += ':';
-    std::visit(AppendField{out}, column.get(cell));
+    std::visit(AppendField{out}, column.get(row));
     separator = ',';
   }
   out += '}';
 }
+
+}  // namespace
+
+void append_cell_text(std::string& out, const Cell& cell) { append_row(out, cell_columns(), cell); }
+
+void append_series_text(std::string& out, const SeriesRow& row) { append_row(out, series_columns(), row); }
 
 void append_event_text(std::string& out, const Event& event) {
   out += "{\"seq\":";

@@ -2,33 +2,14 @@
 #include <algorithm>
 #include <atomic>
 
-#include "engine/base/digest.hpp"
 #include "server/api/api.hpp"
 #include "server/api/codec_event.hpp"
 #include "server/api/estimate.hpp"
+#include "server/api/job_texts.hpp"
+#include "server/api/submission.hpp"
 
 namespace colony::server::api {
 namespace {
-
-// The key of the request; empty: none.
-Result<std::string> idempotency_key(const http::Request& request) {
-  constexpr std::string_view kName = "Idempotency-Key";
-  if (request.headers.count(kName) == 0) return std::string();
-  const std::string key(*request.headers.get(kName));
-  const bool right = request.headers.count(kName) == 1 && !key.empty() && key.size() <= kIdempotencyKeyBytesMax &&
-                     std::all_of(key.begin(), key.end(), [](char c) { return c >= ' ' && c <= '~'; });
-  if (right) return key;
-  return Error{ErrorCode::kInvalid,
-               "a header is wrong",
-               {{std::string(kName), "must be given once, 1 to 200 printable ASCII characters"}}};
-}
-
-// A name for the body as received: the same bytes, the same submission.
-std::string hash_of(const std::string& body) {
-  CanonicalBytes bytes;
-  for (const char c : body) bytes.add_u8(static_cast<std::uint8_t>(c));
-  return chain(Digest{}, std::move(bytes)).hex();
-}
 
 std::string percent_encoded(std::string_view text) {
   constexpr std::string_view kHex = "0123456789ABCDEF";
@@ -56,18 +37,6 @@ Result<std::vector<std::pair<std::string, std::string>>> label_filters(const Que
     labels.emplace_back(text.substr(0, colon), text.substr(colon + 1));
   }
   return labels;
-}
-
-// Commands have no arguments: an empty body, or an empty object.
-Status check_no_arguments(const std::string& body) {
-  if (body.empty()) return Ok{};
-  const auto json = parse_json(body);
-  if (!json) return json.error();
-  if (!json->is_object()) return Error{ErrorCode::kInvalid, "the body is wrong", {{"", "must be an empty object"}}};
-  std::vector<FieldError> errors;
-  for (const auto& [name, value] : json->items()) errors.push_back({child_pointer("", name), "unknown field"});
-  if (!errors.empty()) return Error{ErrorCode::kInvalid, "the body is wrong", std::move(errors)};
-  return Ok{};
 }
 
 // The turn of a submission with many founders; a small one needs none. Two large ones would hold workers that all other
@@ -125,16 +94,14 @@ http::Response post_job(Context& context, const Call& call) {
                                {"name", spec->name},
                                {"labels", labels},
                                {"spec", encode_spec(*spec)},
-                               {"estimate", encode_estimate(estimate(spec->run))}});
+                               {"estimate", encode_estimate(estimate(spec->run, context.config.jobs.threads_per_job))}});
   }
   NewJob job = new_job(*spec);
   job.idempotency_key = *key;
-  job.body_hash = hash_of(call.request.body);
+  job.body_hash = hash_of_body("", call.request.body);
   const auto submitted = context.jobs.submit(job);
   if (!submitted) return failure(submitted.error(), call);
-  http::Response response = json_response(submitted->created ? 201 : 200, encode_job(submitted->view));
-  response.headers.set("Location", context.config.base_path + "/v1/jobs/" + submitted->view.job.id);
-  return response;
+  return submitted_response(context, submitted->view, submitted->created);
 }
 
 http::Response get_jobs(Context& context, const Call& call) {
@@ -153,10 +120,14 @@ http::Response get_jobs(Context& context, const Call& call) {
   }
   const auto page = context.jobs.list(filter, limit, cursor.value_or(""));
   if (!page) return failure(page.error(), call);
-  Json items = Json::array();
-  for (const JobView& view : page->items) items.push_back(encode_job(view));
-  http::Response response =
-      json_response(200, {{"items", std::move(items)}, {"next", page->next ? Json(*page->next) : Json(nullptr)}});
+  http::Response response;
+  response.headers.set("Content-Type", "application/json");
+  response.body = "{\"items\":[";
+  for (const JobView& view : page->items) {
+    if (&view != &page->items.front()) response.body += ',';
+    append_job_text(response.body, view);
+  }
+  response.body += "],\"next\":" + to_text(page->next ? Json(*page->next) : Json(nullptr)) + "}";
   if (page->next) {
     std::string target = context.config.base_path + "/v1/jobs?";
     for (const auto& [name, value] : call.request.query) {
@@ -176,8 +147,8 @@ http::Response get_job_counts(Context& context, const Call& call) {
 }
 
 http::Response get_job(Context& context, const Call& call) {
-  const auto view = context.jobs.show(call.id());
-  return view ? json_response(200, encode_job(*view)) : failure(view.error(), call);
+  const auto text = context.job_texts->read(call.id());
+  return text ? job_answer(**text) : failure(text.error(), call);
 }
 
 http::Response cancel_job(Context& context, const Call& call) { return command(context, call, &JobService::cancel); }

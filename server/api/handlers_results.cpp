@@ -3,7 +3,7 @@
 #include <limits>
 
 #include "server/api/api.hpp"
-#include "server/api/codec_event.hpp"
+#include "server/api/event_text.hpp"
 #include "server/api/lineage.hpp"
 #include "server/api/streams.hpp"
 
@@ -70,7 +70,7 @@ http::Response live_stream(Context& context, const Call& call, StreamWish wish) 
     }
   }
   http::Response response =
-      streamed("text/event-stream", std::make_unique<EventStream>(context.jobs, *view, std::move(wish)));
+      streamed("text/event-stream", std::make_unique<EventStream>(context.jobs, *context.feeds, *view, std::move(wish)));
   response.headers.set("Cache-Control", "no-store");
   return response;
 }
@@ -111,9 +111,15 @@ http::Response get_series(Context& context, const Call& call) {
     for (const SeriesRow& row : *rows) append_csv_row(response.body, series_columns(), row);
     return response;
   }
-  Json items = Json::array();
-  for (const SeriesRow& row : *rows) items.push_back(encode_row(series_columns(), row));
-  return json_response(200, {{"items", std::move(items)}, {"next", nullptr}});
+  http::Response response;
+  response.headers.set("Content-Type", "application/json");
+  response.body = "{\"items\":[";
+  for (const SeriesRow& row : *rows) {
+    if (&row != &rows->front()) response.body += ',';
+    append_series_text(response.body, row);
+  }
+  response.body += "],\"next\":null}";
+  return response;
 }
 
 http::Response get_lineage(Context& context, const Call& call) {

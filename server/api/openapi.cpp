@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 
+#include "server/api/examples.hpp"
 #include "server/api/schema.hpp"
 
 namespace colony::server::api {
@@ -35,6 +36,36 @@ Json query_schema(const QueryParam& param) {
   return Json::object();
 }
 
+std::string path_parameter_text(const std::string& name) {
+  if (name == "step") return "name of a step of the analysis, as its result lists them";
+  return "id, a UUIDv7 in lower case";
+}
+
+// Groups of operations, by the first words of their paths that fit.
+struct Tag {
+  std::string_view name, prefix, description;
+};
+constexpr Tag kTags[] = {{"results", "/v1/jobs/{job_id}/", "what a job has grown"},
+                         {"jobs", "/v1/jobs", "growing colonies: submit, look, command"},
+                         {"pictures", "/v1/analyses", "real pictures, analysed"},
+                         {"comparisons", "/v1/comparisons", "a colony beside a picture"},
+                         {"service", "/", "the service itself"}};
+
+std::string_view tag_of(const Endpoint& endpoint) {
+  // A command is a matter of the job, not of its results.
+  if (endpoint.method == "POST" && endpoint.path.starts_with("/v1/jobs")) return "jobs";
+  for (const Tag& tag : kTags) {
+    if (endpoint.path.starts_with(tag.prefix)) return tag.name;
+  }
+  return "service";
+}
+
+Json tags() {
+  Json list = Json::array();
+  for (const Tag& tag : kTags) list.push_back({{"name", tag.name}, {"description", tag.description}});
+  return list;
+}
+
 Json parameters_of(const Endpoint& endpoint) {
   Json parameters = Json::array();
   if (endpoint.path.find("{job_id}") != std::string_view::npos)
@@ -43,7 +74,11 @@ Json parameters_of(const Endpoint& endpoint) {
        open = endpoint.path.find('{', open + 1)) {
     const std::string name(endpoint.path.substr(open + 1, endpoint.path.find('}', open) - open - 1));
     if (name == "job_id") continue;
-    parameters.push_back({{"name", name}, {"in", "path"}, {"required", true}, {"schema", {{"type", "string"}}}});
+    parameters.push_back({{"name", name},
+                          {"in", "path"},
+                          {"required", true},
+                          {"description", path_parameter_text(name)},
+                          {"schema", {{"type", "string"}}}});
   }
   for (const QueryParam& param : endpoint.query) {
     Json one = {{"name", param.name}, {"in", "query"}, {"description", param.text}, {"schema", query_schema(param)}};
@@ -55,12 +90,15 @@ Json parameters_of(const Endpoint& endpoint) {
       one["style"] = "form";
       one["explode"] = true;
     }
+    if (Json example = parameter_example(param); !example.is_null()) one["example"] = std::move(example);
     parameters.push_back(std::move(one));
   }
   const auto header = [&](const char* name, const char* text, Json schema) {
     parameters.push_back({{"name", name}, {"in", "header"}, {"description", text}, {"schema", std::move(schema)}});
   };
-  if (endpoint.operation_id == "submitJob") {
+  const bool makes_job =
+      endpoint.operation_id == "submitJob" || endpoint.operation_id == "forkJob" || endpoint.operation_id == "verifyJob";
+  if (makes_job) {
     header("Idempotency-Key", "the same key and body give the same job",
            {{"type", "string"}, {"minLength", 1}, {"maxLength", kIdempotencyKeyBytesMax}, {"pattern", "^[ -~]+$"}});
   }
@@ -96,7 +134,8 @@ Json success_answer(const Endpoint& endpoint, int status, std::string_view descr
   const auto header = [&](const char* name, const char* text) {
     answer["headers"][name] = {{"description", text}, {"schema", {{"type", "string"}}}};
   };
-  if (endpoint.operation_id == "submitJob") header("Location", "path of the job");
+  if (endpoint.operation_id == "submitJob" || endpoint.operation_id == "forkJob" || endpoint.operation_id == "verifyJob")
+    header("Location", "path of the job");
   if (status == 201 || status == 202) {
     if (endpoint.operation_id == "analyseImage" || endpoint.operation_id == "compare") {
       header("Location", "path of what was made");
@@ -147,6 +186,9 @@ Json request_body_of(const Endpoint& endpoint) {
   if (endpoint.operation_id == "submitJob") {
     return {{"required", true}, {"content", {{"application/json", {{"schema", reference("JobSpec")}}}}}};
   }
+  if (endpoint.operation_id == "forkJob") {
+    return {{"required", true}, {"content", {{"application/json", {{"schema", reference("ForkSpec")}}}}}};
+  }
   if (endpoint.operation_id == "compare") {
     return {{"required", true}, {"content", {{"application/json", {{"schema", reference("ComparisonSpec")}}}}}};
   }
@@ -172,10 +214,16 @@ Json openapi_document(std::span<const Endpoint> table, const SpecLimits& limits,
                    [](char c) { return static_cast<char>(c - 'A' + 'a'); });
     Json operation = {
         {"operationId", endpoint.operation_id}, {"summary", endpoint.summary}, {"parameters", parameters_of(endpoint)}};
+    operation["tags"] = Json::array({tag_of(endpoint)});
     if (endpoint.method == "POST") operation["requestBody"] = request_body_of(endpoint);
+    if (const Json examples = request_examples(endpoint.operation_id); !examples.is_null()) {
+      for (auto& [media, content] : operation["requestBody"]["content"].items()) content["examples"] = examples;
+    }
     operation["responses"] = responses_of(endpoint);
     paths[std::string(endpoint.path)][method] = std::move(operation);
   }
+  Json schemas = component_schemas(limits);
+  add_component_examples(schemas);
   return {{"openapi", "3.1.0"},
           {"info",
            {{"title", "Colony"},
@@ -186,6 +234,7 @@ Json openapi_document(std::span<const Endpoint> table, const SpecLimits& limits,
              "documents (RFC 9457) that name every wrong field at once."}}},
           {"jsonSchemaDialect", "https://json-schema.org/draft/2020-12/schema"},
           {"servers", Json::array({{{"url", base_path.empty() ? "/" : base_path}}})},
+          {"tags", tags()},
           {"paths", std::move(paths)},
           {"components",
            {{"parameters",
@@ -194,8 +243,9 @@ Json openapi_document(std::span<const Endpoint> table, const SpecLimits& limits,
                 {"in", "path"},
                 {"required", true},
                 {"description", "id of the job, a UUIDv7 in lower case"},
+                {"example", kExampleId},
                 {"schema", {{"type", "string"}}}}}}},
-            {"schemas", component_schemas(limits)}}}};
+            {"schemas", std::move(schemas)}}}};
 }
 
 }  // namespace colony::server::api

@@ -155,4 +155,21 @@ Json job_spec_schema(const SpecLimits& limits) {
           {"additionalProperties", false}};
 }
 
+Json fork_spec_schema(const SpecLimits& limits) {
+  return {{"title", "Fork"},
+          {"description", "model is a partial override of the origin's complete model; what shaped the cells that are there cannot change"},
+          {"type", "object"},
+          {"properties",
+           {{"at_h", {{"type", "number"}, {"minimum", 0}, {"maximum", kUntilTimeMax_h}}},
+            {"at_seq", {{"type", "integer"}, {"minimum", 1}}},
+            {"name", name_schema()},
+            {"labels", labels_schema()},
+            {"seed", {{"type", "integer"}, {"minimum", 0}, {"maximum", kSeedMax}, {"description", "default: the origin's"}}},
+            {"until", until_schema(limits)},
+            {"model", model_schema(false)}}},
+          {"required", Json::array({"until"})},
+          {"oneOf", Json::array({{{"required", Json::array({"at_h"})}}, {{"required", Json::array({"at_seq"})}}})},
+          {"additionalProperties", false}};
+}
+
 }  // namespace colony::server::api

@@ -9,6 +9,8 @@
 namespace colony::server::api {
 
 Json job_spec_schema(const SpecLimits& limits);
+/// The body of a fork: parts of a job spec, and where it begins.
+Json fork_spec_schema(const SpecLimits& limits);
 /// `model` of a job spec; complete: as the server gives it back, with every parameter required.
 Json model_schema(bool is_complete);
 /// components/schemas of openapi.json.

@@ -204,7 +204,6 @@ Json report_components() {
           {"MeasuredLine", line_schema()},
           {"Findings", findings_schema()},
           {"ThresholdSweep", threshold_sweep_schema()},
-          {"Report", strict_object(report_properties())},
           {"JobAnalysis", strict_object(std::move(job))},
           {"ImageMetadata", metadata_schema()},
           {"Segmentation", segmentation_schema()}};

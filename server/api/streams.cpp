@@ -123,44 +123,90 @@ http::BodySource::Pull LogSource::pull(std::string& out) {
   return page_.empty() ? Pull::kEnd : Pull::kMore;
 }
 
-void append_event_message(std::string& out, const Event& event) {
-  ((out += "event: ") += name_of(event.kind())) += "\nid: ";
-  (out += std::to_string(event.seq)) += "\ndata: ";
-  append_event_text(out, event);
-  out += "\n\n";
+EventStream::EventStream(JobService& jobs, Feeds& feeds, const JobView& view, StreamWish wish, Clock clock)
+    : jobs_(jobs),
+      feeds_(feeds),
+      id_(view.job.id),
+      job_key_(view.job.job_key),
+      wish_(std::move(wish)),
+      clock_(std::move(clock)) {}
+
+void EventStream::on_ready(std::function<void()> wake) {
+  feed_ = feeds_.find({id_, job_key_, wish_.events, wish_.filter});
+  subscription_ = feed_->subscribe(std::move(wake));
 }
 
-EventStream::EventStream(JobService& jobs, const JobView& view, StreamWish wish, Clock clock)
-    : jobs_(jobs), id_(view.job.id), job_key_(view.job.job_key), wish_(std::move(wish)), clock_(std::move(clock)) {}
-
-void EventStream::on_ready(std::function<void()> wake) { subscription_ = jobs_.subscribe(job_key_, std::move(wake)); }
-
-void EventStream::append_progress(std::string& out, const JobView& view, bool is_last) {
+void EventStream::append_progress(std::string& out, const WatchedJob& job, bool is_last) {
   wake_after_.reset();
-  Json data = {{"state", name_of(view.job.state)}, {"last_seq", view.job.last_seq}};
-  data.update(encode_progress(view.progress));
-  std::string text = to_text(data);
-  if (text == last_progress_) return;
+  if (job.progress == last_progress_) return;
   const auto now = clock_();
-  const bool is_news = is_last || last_state_ != view.job.state;
+  const bool is_news = is_last || last_state_ != job.state;
   if (const auto due = last_progress_at_.value_or(now - kProgressInterval) + kProgressInterval; !is_news && now < due) {
     // Nothing need happen after this: a job that pauses is silent. Rounded up, so that the next pull is not too early.
     wake_after_ = std::chrono::ceil<std::chrono::milliseconds>(due - now);
     return;
   }
-  out += "event: progress\ndata: " + text + "\n\n";
-  last_progress_ = std::move(text);
-  last_state_ = view.job.state;
+  ((out += "event: progress\ndata: ") += job.progress) += "\n\n";
+  last_progress_ = job.progress;
+  last_state_ = job.state;
   last_progress_at_ = now;
 }
 
+// What follows the events of a piece. Without more of them all of the filter up to job.last_seq were sent.
+http::BodySource::Pull EventStream::say(std::string& out, const WatchedJob& job, bool has_more) {
+  const bool is_over = !has_more && is_terminal(job.state);
+  if (wish_.progress) append_progress(out, job, is_over);
+  if (has_more) return Pull::kMore;
+  if (!is_over) return Pull::kWait;
+  // A message without data is not shown to readers, but its id counts: a reader of progress alone, whose messages have
+  // no id, then also comes back with Last-Event-ID, and gets 204.
+  const Json end = {{"state", name_of(job.state)}, {"reason", job.reason}, {"last_seq", job.last_seq}};
+  out += "id: " + std::to_string(job.last_seq) + "\n\nevent: end\ndata: " + to_text(end) + "\n\n";
+  return Pull::kEnd;
+}
+
+std::optional<http::BodySource::Ready> EventStream::pull_now(std::string& out) {
+  if (!feed_ || is_first_) return std::nullopt;
+  const Feed::News news = feed_->after(wish_.filter.after, out);
+  // Without `event: end` the reader reconnects and is told what became of the job.
+  if (news.kind == Feed::News::Kind::kGone) return Ready{Pull::kEnd, nullptr};
+  if (news.kind == Feed::News::Kind::kBehind) {
+    if (!has_met_feed_ || news.through <= wish_.filter.after + kLagSeqsMax) return std::nullopt;
+    // The ids sent so far stand; a reader that comes back with the last of them misses nothing.
+    const Json lag = {{"sent_seq", wish_.filter.after}, {"last_seq", news.through}};
+    out += "event: lagged\ndata: " + to_text(lag) + "\n\n";
+    return Ready{Pull::kEnd, nullptr};
+  }
+  has_met_feed_ = true;
+  wish_.filter.after = news.position;
+  let_go_of_page();
+  return Ready{say(out, *news.job, news.kind == Feed::News::Kind::kMore), news.piece};
+}
+
+// A stream that waits keeps nothing: a page is 200 kB, and there are a thousand streams. (An assignment of {} would keep the memory.)
+void EventStream::let_go_of_page() {
+  std::vector<Event>().swap(page_);
+  next_ = 0;
+}
+
 http::BodySource::Pull EventStream::pull(std::string& out) {
+  std::string own;
+  if (const auto ready = pull_now(own)) {
+    if (ready->shared) out += *ready->shared;
+    out += own;
+    return ready->pull;
+  }
   if (std::exchange(is_first_, false)) out += "retry: 2000\n\n";
+  return pull_stored(out);
+}
+
+http::BodySource::Pull EventStream::pull_stored(std::string& out) {
   // The state is read before the events: a terminal state is committed with the last event, so if it is seen and no
   // event is left after it, none will ever come.
   const auto view = jobs_.show(id_);
   // Deleted while it was watched, or the storage failed: without `event: end` the reader reconnects and is told.
   if (!view) return Pull::kEnd;
+  const WatchedJob job{view->job.state, view->job.reason, view->job.last_seq, progress_text(*view)};
   if (wish_.events) {
     const bool is_fresh = next_ == page_.size();
     if (is_fresh) {
@@ -172,24 +218,16 @@ http::BodySource::Pull EventStream::pull(std::string& out) {
     // A page that is not full is all there was when it was read. If that was now, after the state, nothing more need be asked: what comes
     // later wakes. If it was in an earlier pull, whose piece was full, the job may have gone on and even ended since.
     const bool is_last_page = is_fresh && page_.size() < kEventsPerRead;
-    for (; next_ < page_.size() && out.size() < kPieceBytes; ++next_) {
+    const std::size_t size_before = out.size();
+    for (; next_ < page_.size() && out.size() - size_before < kPieceBytes; ++next_) {
       append_event_message(out, page_[next_]);
       wish_.filter.after = page_[next_].seq;
     }
-    if (!is_last_page || next_ < page_.size()) {
-      if (wish_.progress) append_progress(out, *view, false);
-      return Pull::kMore;
-    }
+    if (!is_last_page || next_ < page_.size()) return say(out, job, true);
+    let_go_of_page();
   }
-  const bool is_over = is_terminal(view->job.state);
-  if (wish_.progress) append_progress(out, *view, is_over);
-  if (!is_over) return Pull::kWait;
-  // A message without data is not shown to readers, but its id counts: a reader of progress alone, whose messages have
-  // no id, then also comes back with Last-Event-ID, and gets 204.
-  const Json end = {
-      {"state", name_of(view->job.state)}, {"reason", view->job.reason}, {"last_seq", view->job.last_seq}};
-  out += "id: " + std::to_string(view->job.last_seq) + "\n\nevent: end\ndata: " + to_text(end) + "\n\n";
-  return Pull::kEnd;
+  wish_.filter.after = std::max(wish_.filter.after, job.last_seq);
+  return say(out, job, false);
 }
 
 }  // namespace colony::server::api

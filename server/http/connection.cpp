@@ -1,5 +1,8 @@
 #include "server/http/connection.hpp"
 
+#include <algorithm>
+#include <tuple>
+
 #include <boost/asio/buffer.hpp>
 
 namespace colony::server::http {
@@ -52,13 +55,41 @@ Awaitable<Connection::Io> Connection::read(std::size_t bytes_max) {
   co_return deadline_has_passed_ ? Io::kTimeout : Io::kClosed;
 }
 
-Awaitable<Connection::Io> Connection::write(std::string_view bytes, std::int64_t timeout_ms) {
-  while (!bytes.empty()) {
+namespace {
+
+// Takes `count` bytes off the front; false: nothing is left.
+bool advance(Connection::Pieces& pieces, std::size_t count) {
+  bool is_left = false;
+  for (std::string_view& piece : pieces) {
+    const std::size_t taken = std::min(count, piece.size());
+    piece.remove_prefix(taken);
+    count -= taken;
+    is_left = is_left || !piece.empty();
+  }
+  return is_left;
+}
+
+std::array<asio::const_buffer, 4> buffers_of(const Connection::Pieces& pieces) {
+  std::array<asio::const_buffer, 4> buffers;
+  for (std::size_t i = 0; i < pieces.size(); ++i) buffers[i] = asio::const_buffer(pieces[i].data(), pieces[i].size());
+  return buffers;
+}
+
+}  // namespace
+
+Awaitable<Connection::Io> Connection::write(Pieces bytes, std::int64_t timeout_ms) {
+  disarm();
+  if (!socket_.is_open()) co_return Io::kClosed;
+  // Nearly always the socket takes all at once; then no timer is needed, and no turn of the loop.
+  error_code error;
+  std::size_t count = socket_.write_some(buffers_of(bytes), error);  // does not block
+  if (error == asio::error::would_block || error == asio::error::try_again) error.clear();
+  if (error) co_return Io::kClosed;
+  while (advance(bytes, count)) {
     if (!socket_.is_open()) co_return Io::kClosed;
     arm(timeout_ms);
-    const asio::const_buffer rest(bytes.data(), bytes.size());
-    const auto [error, count] = co_await socket_.async_write_some(rest, kAwait);
-    bytes.remove_prefix(count);
+    const auto rest = buffers_of(bytes);
+    std::tie(error, count) = co_await socket_.async_write_some(rest, kAwait);
     if (error) co_return deadline_has_passed_ ? Io::kTimeout : Io::kClosed;
   }
   disarm();

@@ -4,6 +4,7 @@
 // Threads: everything runs on the strand of executor(). At most one of read, write, wait and linger is under way.
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -44,7 +45,9 @@ class Connection : public std::enable_shared_from_this<Connection> {
   Awaitable<Io> read(std::size_t bytes_max);
   /// Sends all of `bytes`, which stay where they are until then; `timeout_ms` is for each step forward and replaces the
   /// armed deadline.
-  Awaitable<Io> write(std::string_view bytes, std::int64_t timeout_ms);
+  using Pieces = std::array<std::string_view, 4>;  // any of them may be empty
+  Awaitable<Io> write(Pieces bytes, std::int64_t timeout_ms);
+  Awaitable<Io> write(std::string_view bytes, std::int64_t timeout_ms) { return write(Pieces{bytes}, timeout_ms); }
 
   /// Until notify() or `until`; may also return for no reason. Check, then wait: both happen on the strand, so that
   /// nothing is lost between them.

@@ -55,6 +55,13 @@ class BodySource {
   /// Appends the next piece (at most about 64 KiB) to `out`. kMore: call again once sent; kWait: nothing now, call again when
   /// woken (or after keep_alive); kEnd: the body is complete (what was appended is still sent).
   virtual Pull pull(std::string& out) = 0;
+  struct Ready {
+    Pull pull = Pull::kWait;
+    std::shared_ptr<const std::string> shared;                 // sent before `out`, uncopied; null: nothing
+  };
+  /// As pull, but of what is in memory already: called on an I/O thread before every pull but the first, so it neither waits nor asks
+  /// a store. nullopt: nothing was appended, and pull is needed.
+  virtual std::optional<Ready> pull_now(std::string& out) { (void)out; return std::nullopt; }
   /// Asked after a pull that gave kWait, on the same thread: how soon to pull again even if nobody wakes; nullopt: no need.
   virtual std::optional<std::chrono::milliseconds> wake_after() { return std::nullopt; }
   /// The session registers how it wants to be woken; `wake` may be called from any thread, also spuriously.

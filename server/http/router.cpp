@@ -38,6 +38,14 @@ bool is_more_specific(const std::vector<std::string>& a, const std::vector<std::
   return false;
 }
 
+std::vector<std::string> captures(const std::vector<std::string>& pattern, const std::vector<std::string>& path) {
+  std::vector<std::string> out;
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    if (pattern[i] == kCapture) out.push_back(path[i]);
+  }
+  return out;
+}
+
 void append_json_string(std::string& out, std::string_view text) {
   constexpr std::string_view kDigits = "0123456789abcdef";
   out += '"';
@@ -83,6 +91,30 @@ void Router::add(std::string method, std::string pattern, Handler handler, Weigh
   auto segments = split(pattern);
   for (const auto& route : routes_) CHECK(route.method != method || route.segments != segments);
   routes_.push_back({std::move(method), std::move(segments), std::move(handler), weight});
+}
+
+void Router::set_ready(std::string_view method, const std::string& pattern, ReadyHandler handler) {
+  const auto segments = split(pattern);
+  const auto route = std::find_if(routes_.begin(), routes_.end(), [&](const Route& one) {
+    return one.method == method && one.segments == segments;
+  });
+  CHECK(route != routes_.end());
+  ready_.emplace_back(static_cast<std::size_t>(route - routes_.begin()), std::move(handler));
+}
+
+std::optional<Response> Router::dispatch_ready(Request& request) const {
+  const auto path = split(request.path);
+  const std::vector<std::string>* const pattern = pattern_of(path);
+  const Route* const route = pattern ? route_of(*pattern, request.method) : nullptr;
+  if (!route) return std::nullopt;
+  const auto ready = std::find_if(ready_.begin(), ready_.end(), [&](const auto& one) { return &routes_[one.first] == route; });
+  if (ready == ready_.end()) return std::nullopt;
+  request.path_params = captures(*pattern, path);
+  try {
+    return ready->second(request);
+  } catch (const std::exception&) {
+    return std::nullopt;  // memory, say: a worker tries again and reports
+  }
 }
 
 void Router::report_failure(const Request& request, std::string_view what) const {
@@ -142,10 +174,7 @@ Response Router::dispatch(Request& request) const {
     return response;
   }
 
-  request.path_params.clear();
-  for (std::size_t i = 0; i < path.size(); ++i) {
-    if ((*pattern)[i] == kCapture) request.path_params.push_back(path[i]);
-  }
+  request.path_params = captures(*pattern, path);
   std::string what = "an exception that is not a std::exception";
   try {
     return chosen->handler(request);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -25,6 +26,11 @@ class Router {
   enum class Weight { kLight, kHeavy };
   void add(std::string method, std::string pattern, Handler handler, Weight weight = Weight::kLight);
   bool is_heavy(const Request& request) const;
+  /// Of a route that is there: what can be answered from memory, on an I/O thread, without waiting for anything; nullopt: dispatch.
+  using ReadyHandler = std::function<std::optional<Response>(const Request&)>;
+  void set_ready(std::string_view method, const std::string& pattern, ReadyHandler handler);
+  /// The answer of such a handler. Sets path_params.
+  std::optional<Response> dispatch_ready(Request& request) const;
   /// Who hears what a handler or a stream threw (any thread); the client gets the request id only.
   void on_failure(std::function<void(const Request&, std::string_view what)> log) { failure_log_ = std::move(log); }
   /// Finds and runs the handler. An exception becomes 500 "internal" with the request id, without details. The pattern is
@@ -37,6 +43,7 @@ class Router {
   const std::vector<std::string>* pattern_of(const std::vector<std::string>& path) const;   // nullptr: none fits
   const Route* route_of(const std::vector<std::string>& pattern, std::string_view method) const;   // GET answers HEAD
   std::vector<Route> routes_;
+  std::vector<std::pair<std::size_t, ReadyHandler>> ready_;   // index of the route
   std::function<void(const Request&, std::string_view)> failure_log_;
 };
 

@@ -234,6 +234,10 @@ Awaitable<void> Session::wait_for_worker() {
 }
 
 Awaitable<void> Session::handle() {
+  if (auto ready = shared_.router.dispatch_ready(request_)) {
+    response_ = std::move(*ready);
+    co_return;
+  }
   auto task = as_worker_task([this] { response_ = shared_.router.dispatch(request_); });
   const bool is_queued = shared_.workers.submit_request(std::move(task), shared_.router.is_heavy(request_));
   if (is_queued) {

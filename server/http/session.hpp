@@ -1,7 +1,7 @@
 // session: the requests of one connection, one after the other: gate, admission, body, router, answer.
-// Promises that nothing of a handler or a stream runs on an I/O thread; that every request is answered in order, or the
-//          connection is closed; that a stream holds a worker only while it is pulled, and is never pulled while its
-//          last piece is still being sent; and that it ends soon after close().
+// Promises that nothing of a handler or a stream runs on an I/O thread but what is in memory already (pull_now); that every
+//          request is answered in order, or the connection is closed; that a stream holds a worker only while it is
+//          pulled, and is never pulled while its last piece is still being sent; and that it ends soon after close().
 // Does not keep a connection after a refusal: where the next request begins is then a matter of trust.
 // Threads: start, drain and close from any thread; everything else on the connection's strand, but for the tasks of
 //          workers, which touch request_, response_ and piece_ while the session waits for them.
@@ -71,7 +71,7 @@ class Session : public std::enable_shared_from_this<Session> {
   Awaitable<bool> answer();
   Awaitable<bool> send_plain(const std::string& head);
   Awaitable<bool> send_stream(Framing framing);
-  Awaitable<bool> send_piece(Framing framing, std::string_view piece);
+  Awaitable<bool> send_piece(Framing framing, std::string_view shared, std::string_view own);
   Awaitable<void> wait_for_stream(std::string_view farewell, Connection::Clock::time_point until);
   Awaitable<void> wait_for_worker();
 
@@ -81,6 +81,7 @@ class Session : public std::enable_shared_from_this<Session> {
   WorkerPool::Task as_worker_task(std::function<void()> work);
   void prepare_response();
   void pull_stream(bool is_first);
+  bool pull_what_is_ready();
   void let_go_of_stream();
   void write_log() const;
   void on_strand(std::function<void()> task);
@@ -108,6 +109,7 @@ class Session : public std::enable_shared_from_this<Session> {
   std::shared_ptr<Waker> waker_;
   bool woken_ = false;
   std::string piece_;
+  std::shared_ptr<const std::string> shared_piece_;  // goes before it
   std::optional<BodySource::Pull> pulled_;  // empty: the pull threw
   std::optional<std::chrono::milliseconds> wake_after_;  // what the source asked for with it
 };

@@ -9,6 +9,8 @@ namespace colony::server::http {
 
 using Io = Connection::Io;
 
+constexpr std::string_view kNothing;
+
 // Stands between a source, which may wake whenever it likes and from any thread, and a session that may have ended.
 // Calls that come before the session has looked are one call.
 class Session::Waker {
@@ -61,6 +63,21 @@ void Session::pull_stream(bool is_first) {
   shared_.router.report_failure(request_, what);
 }
 
+// On the strand. False: nothing was pulled; ask a worker.
+bool Session::pull_what_is_ready() {
+  pulled_.reset();
+  try {
+    auto ready = response_.stream->pull_now(piece_);
+    if (!ready) return false;
+    wake_after_ = ready->pull == BodySource::Pull::kWait ? response_.stream->wake_after() : std::nullopt;
+    shared_piece_ = std::move(ready->shared);
+    pulled_ = ready->pull;
+  } catch (const std::exception& error) {
+    shared_.router.report_failure(request_, error.what());
+  }
+  return true;
+}
+
 Awaitable<bool> Session::send_stream(Framing framing) {
   waker_ = std::make_shared<Waker>(this);
   bool is_first = true;
@@ -70,10 +87,11 @@ Awaitable<bool> Session::send_stream(Framing framing) {
   for (;;) {
     // Before the pull: a wake that comes while it runs must lead to another one.
     woken_ = false;
-    piece_.clear();
-    auto task = as_worker_task([this, is_first] { pull_stream(is_first); });
-    shared_.workers.submit_pull(std::move(task));
-    co_await wait_for_worker();
+    if (is_first || !pull_what_is_ready()) {
+      auto task = as_worker_task([this, is_first] { pull_stream(is_first); });
+      shared_.workers.submit_pull(std::move(task));
+      co_await wait_for_worker();
+    }
     is_first = false;
     if (closing_) co_return false;
     if (!pulled_) {
@@ -81,10 +99,14 @@ Awaitable<bool> Session::send_stream(Framing framing) {
       co_return false;
     }
 
-    bool is_sent = co_await send_piece(framing, piece_);
+    const bool is_silent_pull = piece_.empty() && !shared_piece_;
+    const std::string_view shared = shared_piece_ ? std::string_view(*shared_piece_) : kNothing;
+    bool is_sent = co_await send_piece(framing, shared, piece_);
+    shared_piece_.reset();
+    std::string().swap(piece_);  // a thousand streams that wait hold a thousand of what stays here
     if (!is_sent) co_return false;
     if (*pulled_ == BodySource::Pull::kEnd) break;
-    if (!piece_.empty()) silent_since = Connection::Clock::now();
+    if (!is_silent_pull) silent_since = Connection::Clock::now();
     // A stream with a farewell can be taken up again elsewhere; one without goes on to its end, as
     // long as the server waits for it.
     const std::string_view farewell = response_.stream->farewell();
@@ -95,13 +117,13 @@ Awaitable<bool> Session::send_stream(Framing framing) {
       if (closing_ || connection_->peer_has_closed()) co_return false;
       const bool is_silent = !woken_ && !(draining_ && !farewell.empty());
       if (is_silent && Connection::Clock::now() >= silent_since + silence_max) {
-        is_sent = co_await send_piece(framing, response_.stream->keep_alive());
+        is_sent = co_await send_piece(framing, kNothing, response_.stream->keep_alive());
         if (!is_sent) co_return false;
         silent_since = Connection::Clock::now();
       }
     }
     if (draining_ && !farewell.empty()) {
-      is_sent = co_await send_piece(framing, farewell);
+      is_sent = co_await send_piece(framing, kNothing, farewell);
       if (!is_sent) co_return false;
       keep_alive_ = false;
       break;
@@ -114,11 +136,15 @@ Awaitable<bool> Session::send_stream(Framing framing) {
   co_return true;
 }
 
-Awaitable<bool> Session::send_piece(Framing framing, std::string_view piece) {
-  if (piece.empty()) co_return true;
-  const std::string chunk = framing == Framing::kChunked ? write_chunk(piece) : std::string(piece);
-  const Io io = co_await connection_->write(chunk, shared_.config.write_timeout_ms);
-  if (io == Io::kDone) sent_bytes_ += piece.size();
+// One chunk of both, in one write and uncopied.
+Awaitable<bool> Session::send_piece(Framing framing, std::string_view shared, std::string_view own) {
+  const std::size_t size = shared.size() + own.size();
+  if (size == 0) co_return true;
+  const bool is_chunk = framing == Framing::kChunked;
+  const std::string size_line = is_chunk ? write_chunk_size(size) : std::string();
+  const Connection::Pieces pieces = {size_line, shared, own, is_chunk ? std::string_view("\r\n") : std::string_view()};
+  const Io io = co_await connection_->write(pieces, shared_.config.write_timeout_ms);
+  if (io == Io::kDone) sent_bytes_ += size;
   co_return io == Io::kDone;
 }
 

@@ -65,13 +65,11 @@ std::string write_head(const Response& response, const WireOptions& options) {
   return out.append("\r\n");
 }
 
-std::string write_chunk(std::string_view piece) {
+std::string write_chunk_size(std::size_t size) {
   constexpr std::string_view kDigits = "0123456789abcdef";
-  std::string size;
-  for (std::size_t rest = piece.size(); rest != 0; rest /= 16) size.insert(size.begin(), kDigits[rest % 16]);
-  std::string out;
-  out.reserve(size.size() + piece.size() + 4);
-  return out.append(size).append("\r\n").append(piece).append("\r\n");
+  std::string out = "\r\n";
+  for (std::size_t rest = size; rest != 0; rest /= 16) out.insert(out.begin(), kDigits[rest % 16]);
+  return out;
 }
 
 // By hand, because strftime speaks the language of the locale.

@@ -34,8 +34,8 @@ bool has_body(int status);
 
 std::string_view reason_phrase(int status);
 
-/// One chunk of a chunked body; `piece` is not empty.
-std::string write_chunk(std::string_view piece);
+/// The line before a chunk of a chunked body; `size` is not 0. The chunk ends with another CR LF.
+std::string write_chunk_size(std::size_t size);
 inline constexpr std::string_view kLastChunk = "0\r\n\r\n";
 inline constexpr std::string_view kContinue = "HTTP/1.1 100 Continue\r\n\r\n";
 

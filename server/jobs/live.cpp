@@ -88,6 +88,15 @@ void LiveJob::committed(const JobRow& job) {
   if (samples_.size() > kSamplesMax) samples_.pop_front();
 }
 
+void LiveJob::progressed(const Progress& progress) {
+  const std::lock_guard lock(mutex_);
+  last_ = progress;
+  const Clock::time_point now = Clock::now();
+  if (!samples_.empty() && now - samples_.back().at < kSampleEvery) return;
+  samples_.push_back({now, last_.cells, last_.fraction.value_or(0.0)});
+  if (samples_.size() > kSamplesMax) samples_.pop_front();
+}
+
 Progress LiveJob::progress() const {
   const std::lock_guard lock(mutex_);
   Progress progress = last_;

@@ -50,6 +50,8 @@ class LiveJob {
 
   /// After a commit: `job` as stored.
   void committed(const JobRow& job);
+  /// Of work that commits nothing on its way (verifying). Not the row's last_seq: the job's own, which stays.
+  void progressed(const Progress& progress);
   bool has_committed() const { return has_committed_.load(std::memory_order_acquire); }
   Progress progress() const;
 

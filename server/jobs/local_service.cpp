@@ -7,10 +7,14 @@
 namespace colony::server {
 namespace {
 constexpr std::size_t kSeriesPointsMax = 10'000;
+
+Error no_colony(const JobRow& job) {
+  return {ErrorCode::kNotFound, "job " + job.id + " has no colony: it is of kind " + job.kind};
+}
 }  // namespace
 
-std::unique_ptr<JobService> JobService::create(Store& store, JobsConfig config, SpecDecoder decode) {
-  return std::make_unique<LocalJobService>(store, config, std::move(decode));
+std::unique_ptr<JobService> JobService::create(Store& store, JobsConfig config, SpecDecoder decode, VerifyCodec verify) {
+  return std::make_unique<LocalJobService>(store, std::move(config), std::move(decode), std::move(verify));
 }
 
 JobView LocalJobService::view_of(JobRow job) {
@@ -44,6 +48,61 @@ Result<JobView> LocalJobService::show(const std::string& id) {
   auto job = store_.find_job(id);
   if (!job) return job.error();
   return view_of(std::move(*job));
+}
+
+Result<std::optional<JobView>> LocalJobService::submitted_before(const NewJob& job) {
+  auto row = store_.find_submitted(job);
+  if (!row) return row.error();
+  if (!*row) return std::optional<JobView>();
+  return std::optional<JobView>(view_of(std::move(**row)));
+}
+
+Result<JobService::ForkPoint> LocalJobService::fork_point(const std::string& id, std::optional<double> at_h,
+                                                          std::optional<std::uint64_t> at_seq) {
+  auto job = store_.find_job(id);
+  if (!job) return job.error();
+  if (job->kind != kColonyKind) return no_colony(*job);
+  const bool is_live = !is_terminal(job->state);
+  std::uint64_t seq = at_seq.value_or(job->last_seq);
+  if (seq > job->last_seq) {
+    const std::string message = "the last event of the job is " + std::to_string(job->last_seq);
+    if (is_live) return Error{ErrorCode::kNotReached, "the job has not reached this event", {{"/at_seq", message}}};
+    return Error{ErrorCode::kInvalid, "the history ends before this event", {{"/at_seq", message}}};
+  }
+  if (at_h) {
+    if (!std::isfinite(*at_h) || *at_h < 0.0) {
+      return Error{ErrorCode::kInvalid, "at_h is out of range", {{"/at_h", "must be a finite number, 0 or more"}}};
+    }
+    if (is_live && *at_h > job->time_h) {
+      return Error{ErrorCode::kNotReached,
+                   "the job has not reached this time",
+                   {{"/at_h", "the job is at " + std::to_string(job->time_h) + " h"}}};
+    }
+    if (*at_h < job->time_h) {
+      const auto found = store_.seq_at(job->job_key, *at_h);
+      if (!found) return found.error();
+      seq = *found;
+    }
+  }
+  if (!is_live && seq == job->last_seq) --seq;  // `finished` stays behind
+  auto at = past_.colony_after(*job, seq);
+  if (!at) return at.error();
+  return ForkPoint{std::move(*job), seq, std::move(*at)};
+}
+
+Result<JobService::Submitted> LocalJobService::fork(const NewJob& job, const ForkPoint& point) {
+  const Colony& colony = *point.at.colony;
+  const ForkTail tail{point.at_seq,
+                      colony.time_h(),
+                      colony.digest(),
+                      colony.cells().size(),
+                      colony.count(Activity::kActive),
+                      colony.count(Activity::kPassive),
+                      colony.count(Activity::kSenescent)};
+  auto made = store_.fork_job(job, point.origin.job_key, tail, config_.queued_max, &stop_copying_);
+  if (!made) return made.error();
+  if (made->created) nudge_runners();
+  return Submitted{view_of(std::move(made->job)), made->created};
 }
 
 Result<JobService::Page> LocalJobService::list(const JobFilter& filter, std::size_t limit, const std::string& cursor) {
@@ -115,13 +174,17 @@ Status LocalJobService::remove(const std::string& id) {
   if (!job) return job.error();
   const Status removed = store_.delete_job(job->job_key);
   if (!removed) return removed.error();
-  past_.forget(job->job_key);
+  forget(job->job_key);
+  return Ok{};
+}
+
+void LocalJobService::forget(std::int64_t job_key) {
+  past_.forget(job_key);
   {
     const std::lock_guard lock(mutex_);
-    last_pause_.erase(job->job_key);
+    last_pause_.erase(job_key);
   }
-  hub_->announce(job->job_key);
-  return Ok{};
+  hub_->announce(job_key);
 }
 
 Result<std::vector<Event>> LocalJobService::events(const std::string& id, const EventFilter& filter,
@@ -140,6 +203,7 @@ Result<std::vector<LogRow>> LocalJobService::log(const std::string& id, std::int
 Result<ColonyAt> LocalJobService::colony_at(const std::string& id, std::optional<double> at_h) {
   const auto job = store_.find_job(id);
   if (!job) return job.error();
+  if (job->kind != kColonyKind) return no_colony(*job);
   if (!at_h) return past_.colony_after(*job, job->last_seq);
   if (!std::isfinite(*at_h) || *at_h < 0.0) {
     return Error{ErrorCode::kInvalid, "at_h is out of range", {{"at_h", "must be a finite number, 0 or more"}}};
@@ -168,6 +232,7 @@ Result<std::vector<SeriesRow>> LocalJobService::series(const std::string& id, st
   }
   const auto job = store_.find_job(id);
   if (!job) return job.error();
+  if (job->kind != kColonyKind) return no_colony(*job);
   return past_.series(*job, points);
 }
 

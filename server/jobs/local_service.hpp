@@ -1,6 +1,7 @@
 // local_service: the JobService that grows colonies on threads of this process. Not for use outside this folder.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
@@ -21,14 +22,19 @@ namespace colony::server {
 
 class LocalJobService final : public JobService {
  public:
-  LocalJobService(Store& store, JobsConfig config, SpecDecoder decode);
+  LocalJobService(Store& store, JobsConfig config, SpecDecoder decode, VerifyCodec verify);
   ~LocalJobService() override;
 
   Status start() override;
   void drain() override;
 
   Result<Submitted> submit(const NewJob& job) override;
+  Result<std::optional<JobView>> submitted_before(const NewJob& job) override;
+  Result<ForkPoint> fork_point(const std::string& id, std::optional<double> at_h,
+                               std::optional<std::uint64_t> at_seq) override;
+  Result<Submitted> fork(const NewJob& job, const ForkPoint& point) override;
   Result<JobView> show(const std::string& id) override;
+  std::uint64_t commit_count() const override { return store_.commit_count(); }
   Result<Page> list(const JobFilter& filter, std::size_t limit, const std::string& cursor) override;
   Result<std::vector<std::uint64_t>> counts() override;
 
@@ -59,10 +65,12 @@ class LocalJobService final : public JobService {
   /// The runner of `live` has written its last and gives the job back.
   void leave(const JobRow& job, const std::shared_ptr<LiveJob>& live, RunEnd end);
   void retry_loop();
+  void retention_loop();
   /// Puts a stalled job back to work if the store allows it; false: not yet.
   bool retry(std::int64_t job_key, std::uint64_t ticket);
   bool is_stalled(std::int64_t job_key, std::uint64_t ticket) const;  // mutex_ is held
   void nudge_runners();
+  void forget(std::int64_t job_key);  // it was deleted
   JobView view_of(JobRow job);
   Result<Commanded> command(const std::string& id, JobCommand command, LiveJob::Wish wish);
   /// Waits until no runner holds the job; false after command_wait_ms or when draining.
@@ -71,6 +79,8 @@ class LocalJobService final : public JobService {
   Store& store_;  // fixed after construction
   const JobsConfig config_;
   const SpecDecoder decode_;
+  const VerifyCodec verify_;
+  std::atomic<bool> stop_copying_{false};  // with draining_, for forks under way
   const std::shared_ptr<Hub> hub_ = std::make_shared<Hub>();  // synchronises itself
   Past past_;                                                 // synchronises itself
   const RunnerEnvironment environment_;

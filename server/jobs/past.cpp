@@ -1,6 +1,7 @@
 #include "server/jobs/past.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <exception>
 #include <string>
 #include <utility>
@@ -12,6 +13,8 @@ namespace {
 
 constexpr std::size_t kPage = 2000;
 constexpr std::size_t kSeriesMax = 32;
+constexpr std::uint64_t kCurveEventsMax = 200'000;
+constexpr std::size_t kCurveRowsMax = 500'000;  // 40 MB
 
 /// Calls `use(event)` for every event with after < seq <= last, page by page.
 template <class Use>
@@ -40,6 +43,19 @@ Error does_not_fold(const JobRow& job, const std::exception& error) {
 }
 
 }  // namespace
+
+/// The growth curve of a job that may go on: its row after every event, and the colony from which the next ones follow. A dashboard asks every
+/// few seconds for a curve that has grown by a few events, and its points then lie at other times: without all rows the whole history would
+/// be folded again.
+struct Past::Curve {
+  Curve(const JobRow& job, const RunSpec& spec) : job_key(job.job_key), colony(spec.params), tracker(colony) {}
+  const std::int64_t job_key;
+  std::atomic<std::size_t> size{0};  // of rows, for who does not hold the lock
+  std::mutex mutex;                  // guards everything below
+  Colony colony;
+  SeriesTracker tracker;
+  std::vector<SeriesRow> rows;  // after event 1, 2, 3, ...; each at the time of its event
+};
 
 Past::Past(Store& store, const SpecDecoder& decode, std::size_t colonies_max, std::uint64_t cells_max)
     : store_(store), decode_(decode), colonies_max_(colonies_max), cells_max_(cells_max) {}
@@ -106,31 +122,60 @@ Result<std::vector<SeriesRow>> Past::series(const JobRow& job, std::size_t point
   }
   const auto spec = decode_(job.spec_json);
   if (!spec) return Error{ErrorCode::kInternal, "the stored spec cannot be used: " + spec.error().message};
-  const double end_h = job.time_h;
-  const std::size_t count = end_h > 0.0 ? points : 1;
-  const auto time_of = [&](std::size_t k) {
-    return k + 1 == count ? end_h : end_h * static_cast<double>(k) / static_cast<double>(count - 1);
-  };
-  std::vector<SeriesRow> rows;
+  const std::shared_ptr<Curve> curve = curve_of(job, *spec);
+  auto rows = series_along(job, *curve, points);
+  const std::lock_guard lock(mutex_);
+  std::size_t kept_rows = 0;
+  curves_.remove_if([&](const std::shared_ptr<Curve>& one) {
+    const std::size_t size = one->size.load();
+    const bool is_too_much = (one == curve && !rows) || size > kCurveEventsMax || kept_rows + size > kCurveRowsMax;
+    if (!is_too_much) kept_rows += size;
+    return is_too_much;
+  });
+  if (!rows) return rows;
+  series_.push_front({job.job_key, job.last_seq, points, *rows});
+  if (series_.size() > kSeriesMax) series_.pop_back();
+  return rows;
+}
+
+std::shared_ptr<Past::Curve> Past::curve_of(const JobRow& job, const RunSpec& spec) {
+  const std::lock_guard lock(mutex_);
+  const auto known = std::find_if(curves_.begin(), curves_.end(), [&](const auto& one) { return one->job_key == job.job_key; });
+  if (known == curves_.end()) {
+    curves_.push_front(std::make_shared<Curve>(job, spec));
+  } else {
+    curves_.splice(curves_.begin(), curves_, known);
+  }
+  return curves_.front();
+}
+
+Result<std::vector<SeriesRow>> Past::series_along(const JobRow& job, Curve& curve, std::size_t points) {
+  const std::lock_guard lock(curve.mutex);
   try {
-    Colony colony(spec->params);
-    SeriesTracker tracker(colony);
-    const auto add_row = [&] { rows.push_back(tracker.row(time_of(rows.size()))); };
-    const Status folded = for_each_event(store_, &stop_, job.job_key, 0, job.last_seq, [&](const Event& event) {
-      while (rows.size() < count && time_of(rows.size()) < event.time_h) add_row();
-      colony.apply(event);
-      tracker.follow(event, colony);
+    const Status folded = for_each_event(store_, &stop_, job.job_key, curve.rows.size(), job.last_seq, [&](const Event& event) {
+      curve.colony.apply(event);
+      curve.tracker.follow(event, curve.colony);
+      curve.rows.push_back(curve.tracker.row(event.time_h));
     });
+    curve.size = curve.rows.size();
     if (!folded) return folded.error();
-    while (rows.size() < count) add_row();
   } catch (const Stopped&) {
     return stopped();
   } catch (const std::exception& error) {
     return does_not_fold(job, error);
   }
-  const std::lock_guard lock(mutex_);
-  series_.push_front({job.job_key, job.last_seq, points, rows});
-  if (series_.size() > kSeriesMax) series_.pop_back();
+  const double end_h = job.time_h;
+  const std::size_t count = end_h > 0.0 ? points : 1;
+  // Another question may have led the curve beyond the moment of this one.
+  const auto end = curve.rows.begin() + static_cast<std::ptrdiff_t>(job.last_seq);
+  std::vector<SeriesRow> rows;
+  for (std::size_t k = 0; k < count; ++k) {
+    const double time_h = k + 1 == count ? end_h : end_h * static_cast<double>(k) / static_cast<double>(count - 1);
+    const auto next = std::upper_bound(curve.rows.begin(), end, time_h,
+                                       [](double at_h, const SeriesRow& row) { return at_h < row.time_h; });
+    rows.push_back(next == curve.rows.begin() ? SeriesRow{} : *std::prev(next));
+    rows.back().time_h = time_h;
+  }
   return rows;
 }
 
@@ -141,6 +186,7 @@ void Past::forget(std::int64_t job_key) {
     return kept.job_key == job_key;
   });
   series_.remove_if([&](const KeptSeries& kept) { return kept.job_key == job_key; });
+  curves_.remove_if([&](const auto& one) { return one->job_key == job_key; });
 }
 
 }  // namespace colony::server

@@ -1,5 +1,6 @@
 // past: colonies and growth curves at past moments, folded from the stored events and kept for the next question.
 // Promise: what is kept has at most colonies_max colonies of cells_max cells together; a colony that is larger alone is not kept.
+//          Growth curves keep kCurveRowsMax rows together; a job of more than kCurveEventsMax events is folded at every question.
 // Method:  a fold starts from the nearest kept earlier fold of the same job, else from the first event.
 // Errors:  as the store's; kUnavailable after stop() for what is not kept; kInternal when a stored history does not fold (its digest chain is checked on the way).
 // Threads: every function from any thread; two threads may fold the same moment, and either answer is kept.
@@ -31,6 +32,9 @@ class Past {
   void forget(std::int64_t job_key);
 
  private:
+  struct Curve;
+  std::shared_ptr<Curve> curve_of(const JobRow& job, const RunSpec& spec);
+  Result<std::vector<SeriesRow>> series_along(const JobRow& job, Curve& curve, std::size_t points);
   void keep(const JobRow& job, const std::shared_ptr<const Colony>& colony, const std::shared_ptr<const RunSpec>& spec);
 
   struct KeptColony {
@@ -55,6 +59,7 @@ class Past {
   std::list<KeptColony> colonies_;  // used last: first; at most colonies_max_
   std::uint64_t kept_cells_ = 0;    // in colonies_; at most cells_max_
   std::list<KeptSeries> series_;    // used last: first; at most kSeriesMax
+  std::list<std::shared_ptr<Curve>> curves_;  // used last: first
 };
 
 }  // namespace colony::server

@@ -1,9 +1,11 @@
 #include "server/jobs/runner.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <exception>
 #include <mutex>
+#include <thread>
 #include <utility>
 
 #include "engine/base/check.hpp"
@@ -52,6 +54,7 @@ class Run {
   RunEnd begin();
   bool replay();  // false: asked to stop
   RunEnd grow();
+  void keep_pace();
   RunEnd stop(LiveJob::Wish wish);
   RunEnd end(JobState state, const std::string& reason, const std::string& detail);
   RunEnd end_from_outside(JobState state, FinishReason reason, const std::string& detail);
@@ -74,6 +77,7 @@ class Run {
   std::vector<Event> events_;             // taken, not yet given to the store
   std::vector<SeriesRow> series_;
   Clock::time_point batch_since_{};
+  Clock::time_point pace_due_{};          // of the next event, where there is a pace
   const std::shared_ptr<Commits> commits_ = std::make_shared<Commits>();
 };
 
@@ -171,6 +175,21 @@ RunEnd Run::grow() {
                               "more than " + std::to_string(env_.config.events_max) + " events (limits.events_max)");
     }
     if (events_.size() >= kBatchEvents || Clock::now() >= batch_since_ + kBatchAge) append();
+    if (env_.config.events_per_s_max > 0) keep_pace();
+  }
+}
+
+// Sleeps in short steps, so that neither a wish nor the batch begun waits for a slow pace. What a long search has missed is caught up with,
+// but no more than a second of it.
+void Run::keep_pace() {
+  const auto step = std::chrono::duration_cast<Clock::duration>(
+      std::chrono::duration<double>(1.0 / static_cast<double>(env_.config.events_per_s_max)));
+  pace_due_ = std::max(pace_due_, Clock::now() - std::chrono::seconds(1)) + step;
+  while (live_->wish() == LiveJob::Wish::kNone) {
+    const auto now = Clock::now();
+    if (now >= pace_due_) return;
+    if (!events_.empty() && now >= batch_since_ + kBatchAge) append();
+    std::this_thread::sleep_until(std::min<Clock::time_point>(pace_due_, now + kBatchAge));
   }
 }
 

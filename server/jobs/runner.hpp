@@ -16,6 +16,7 @@ struct RunnerEnvironment {
   Store& store;
   const JobsConfig& config;
   const SpecDecoder& decode;
+  const VerifyCodec& verify;
   Hub& hub;
 };
 

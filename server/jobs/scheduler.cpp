@@ -5,18 +5,21 @@
 #include <utility>
 
 #include "server/jobs/local_service.hpp"
+#include "server/jobs/retention.hpp"
+#include "server/jobs/verifier.hpp"
 
 namespace colony::server {
 namespace {
 constexpr int kPauseDoublings = 64;  // the longest pause between two tries, in first pauses
 }  // namespace
 
-LocalJobService::LocalJobService(Store& store, JobsConfig config, SpecDecoder decode)
+LocalJobService::LocalJobService(Store& store, JobsConfig config, SpecDecoder decode, VerifyCodec verify)
     : store_(store),
-      config_(config),
+      config_(std::move(config)),
       decode_(std::move(decode)),
+      verify_(std::move(verify)),
       past_(store_, decode_, config_.cached_colonies_max, config_.cached_cells_max),
-      environment_{store_, config_, decode_, *hub_} {}
+      environment_{store_, config_, decode_, verify_, *hub_} {}
 
 LocalJobService::~LocalJobService() { drain(); }
 
@@ -48,11 +51,15 @@ Status LocalJobService::start() {
     threads_.emplace_back([this] { run_loop(); });
   }
   threads_.emplace_back([this] { retry_loop(); });
+  if (config_.retention.keep_days > 0 || config_.retention.keep_bytes > 0) {
+    threads_.emplace_back([this] { retention_loop(); });
+  }
   return Ok{};
 }
 
 void LocalJobService::drain() {
   past_.stop();
+  stop_copying_ = true;
   std::vector<std::thread> threads;
   {
     const std::lock_guard take_lock(take_mutex_);  // so that no job is between store and live_
@@ -123,7 +130,7 @@ void LocalJobService::run_loop() {
     }
     const auto& [job, live] = *taken;
     hub_->announce(job.job_key);
-    leave(job, live, run_job(environment_, job, live));
+    leave(job, live, job.kind == kVerifyKind ? verify_job(environment_, job, live) : run_job(environment_, job, live));
     changed_.notify_all();
     hub_->announce(job.job_key);
   }
@@ -187,6 +194,16 @@ void LocalJobService::retry_loop() {
     changed_.notify_all();
     hub_->announce(job_key);
     lock.lock();
+  }
+}
+
+void LocalJobService::retention_loop() {
+  std::unique_lock lock(mutex_);
+  while (!draining_) {
+    lock.unlock();
+    expire_jobs(store_, config_, [this](const JobRow& job) { forget(job.job_key); });
+    lock.lock();
+    changed_.wait_for(lock, std::chrono::milliseconds(config_.retention_every_ms), [&] { return draining_; });
   }
 }
 

@@ -28,7 +28,12 @@ struct JobsConfig {
   std::uint64_t cached_cells_max = 2'000'000;  // and the cells of them all; a larger colony is served but not kept
   std::int64_t command_wait_ms = 1'000;    // how long cancel and pause wait for the runner; then the view as it is
   std::int64_t storage_retry_ms = 1'000;   // first pause after a storage error; doubles up to 64 times this
+  std::uint64_t events_per_s_max = 0;      // of each job: it waits rather than be faster. 0: as fast as it decides
   std::uint64_t free_bytes_min = 16'777'216;   // a job stopped by the disk goes on only with this much free
+  RetentionLimits retention;               // none by default
+  std::int64_t retention_every_ms = 60'000;
+  std::function<std::int64_t()> now_ms;    // since 1970, for retention; empty: the system's clock
+  std::function<void(const std::string&)> log;   // what operators should see; empty: nobody does. From any thread
 };
 
 /// Where a job is now; for a live job fresher than its row (but never ahead of the last commit in `last_seq`).
@@ -57,9 +62,36 @@ struct ColonyAt {
 /// Turns a stored spec into what the simulator runs (main.cpp wires the codec in, so that jobs/ needs no JSON).
 using SpecDecoder = std::function<Result<RunSpec>(const std::string& spec_json)>;
 
+/// What a job of kind "verify" is to do.
+struct VerifyTask {
+  std::string job_id;
+  std::uint64_t to_seq = 0;                // the last event compared; 0: there is none yet
+};
+/// A part of a history that was grown with one spec: from where the part before ends, up to last_seq or to where a later part begins.
+struct Stretch {
+  std::uint64_t last_seq = 0;
+  RunSpec spec;
+};
+struct VerifyOutcome {
+  bool identical = false;
+  std::uint64_t events = 0;                // found identical, from the first on
+  std::optional<std::uint64_t> first_differing_seq;
+  std::optional<Digest> expected_digest;   // of the event made again; none: no event should be there
+  std::optional<Digest> actual_digest;     // of the event as stored; none: it is missing
+  std::string message;                     // what differs, for people; empty if identical
+};
+/// The JSON of verify jobs, and of the origins of forks; from api/, as SpecDecoder.
+struct VerifyCodec {
+  std::function<Result<VerifyTask>(const std::string& spec_json)> task;
+  /// In the order of seq; the last has no bound of its own.
+  std::function<Result<std::vector<Stretch>>(const JobRow& job)> stretches;
+  std::function<std::string(const VerifyOutcome& outcome)> result;
+};
+
 class JobService {
  public:
-  static std::unique_ptr<JobService> create(Store& store, JobsConfig config, SpecDecoder decode);
+  /// Without a VerifyCodec jobs of kind "verify" fail.
+  static std::unique_ptr<JobService> create(Store& store, JobsConfig config, SpecDecoder decode, VerifyCodec verify = {});
   virtual ~JobService() = default;         // as drain()
 
   /// Recovers jobs that were running when the process died, then starts the runners.
@@ -70,7 +102,23 @@ class JobService {
 
   struct Submitted { JobView view; bool created = true; };
   virtual Result<Submitted> submit(const NewJob& job) = 0;
+  /// The job that `job`'s idempotency key made before, if any; kKeyReused if with another body.
+  virtual Result<std::optional<JobView>> submitted_before(const NewJob& job) = 0;
+  /// A place in a history where another may leave it.
+  struct ForkPoint {
+    JobRow origin;
+    std::uint64_t at_seq = 0;              // never that of `finished`
+    ColonyAt at;
+  };
+  /// Of a colony, by time (all events up to at_h; beyond the end: the last state) or by seq: exactly one is given. Errors name "/at_h"
+  /// or "/at_seq": kNotReached where a live job has not come yet, kInvalid beyond the end. Long for a long history, as colony_at.
+  virtual Result<ForkPoint> fork_point(const std::string& id, std::optional<double> at_h, std::optional<std::uint64_t> at_seq) = 0;
+  /// A new job that goes on from there. Whether job.spec_json suits the colony is the caller's to know. Returns when all is copied.
+  virtual Result<Submitted> fork(const NewJob& job, const ForkPoint& point) = 0;
   virtual Result<JobView> show(const std::string& id) = 0;
+  /// As Store::commit_count. But for rates, which are of the moment, and a job that the store has stopped and could not say so, a view is
+  /// as it was while this number stands.
+  virtual std::uint64_t commit_count() const = 0;
   struct Page { std::vector<JobView> items; std::optional<std::string> next; };
   virtual Result<Page> list(const JobFilter& filter, std::size_t limit, const std::string& cursor) = 0;
   virtual Result<std::vector<std::uint64_t>> counts() = 0;

@@ -1,5 +1,6 @@
 #include "server/store/identity.hpp"
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstdio>
@@ -8,11 +9,6 @@
 
 namespace colony::server {
 namespace {
-
-std::int64_t now_ms() {
-  return std::chrono::duration_cast<std::chrono::milliseconds>(std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
 
 std::string hex16(std::uint64_t value) {
   std::array<char, 17> text{};
@@ -49,8 +45,15 @@ std::optional<std::uint64_t> from_hex16(std::string_view text) {
 
 }  // namespace
 
-std::string wall_time_text() {
-  const std::int64_t ms = now_ms();
+std::int64_t wall_time_ms() {
+  return std::chrono::duration_cast<std::chrono::milliseconds>(std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+std::string wall_time_text() { return wall_time_text(wall_time_ms()); }
+
+std::string wall_time_text(std::int64_t at_ms) {
+  const std::int64_t ms = std::max<std::int64_t>(at_ms, 0);
   const auto seconds = static_cast<std::time_t>(ms / 1000);
   std::tm utc{};
   gmtime_r(&seconds, &utc);
@@ -63,7 +66,7 @@ std::string wall_time_text() {
 std::string new_job_id() {
   std::random_device device;  // the system's generator on Linux
   const auto draw = [&device] { return static_cast<std::uint64_t>(device()) << 32 | device(); };
-  const std::uint64_t high = static_cast<std::uint64_t>(now_ms()) << 16 | 0x7000U | (draw() & 0xFFFU);
+  const std::uint64_t high = static_cast<std::uint64_t>(wall_time_ms()) << 16 | 0x7000U | (draw() & 0xFFFU);
   const std::uint64_t low = 0x8000000000000000ULL | (draw() >> 2);
   const std::string digits = hex16(high) + hex16(low);
   return digits.substr(0, 8) + "-" + digits.substr(8, 4) + "-" + digits.substr(12, 4) + "-" + digits.substr(16, 4) +

@@ -11,6 +11,10 @@ namespace colony::server {
 
 /// Now, RFC 3339 UTC with milliseconds: 2026-11-22T05:36:07.123Z.
 std::string wall_time_text();
+/// The same of a moment, ms since 1970: texts of the years 0..9999 sort as the moments do.
+std::string wall_time_text(std::int64_t at_ms);
+/// Now, ms since 1970.
+std::int64_t wall_time_ms();
 
 /// A new UUID of version 7, lower case: milliseconds since 1970, then 74 random bits.
 std::string new_job_id();

@@ -65,6 +65,52 @@ std::optional<JobRow> first_row(Connection& connection, Statement& statement) {
   return job;
 }
 
+struct Condition {
+  bool is_label = false;
+  std::string name;  // of a label (a client's text), else of a column (ours)
+  std::string value;
+};
+
+std::vector<Condition> conditions_of(const JobFilter& filter) {
+  std::vector<Condition> out;
+  if (filter.state) out.push_back({false, "state", std::string(name_of(*filter.state))});
+  if (filter.kind) out.push_back({false, "kind", *filter.kind});
+  if (filter.name) out.push_back({false, "name", *filter.name});
+  for (const auto& [name, value] : filter.labels) out.push_back({true, name, value});
+  return out;
+}
+
+void bind_condition(Statement& to, const Condition& condition) {
+  if (condition.is_label) {
+    to.bind(std::string_view(condition.name));
+  } else {
+    to.skip(1);
+  }
+  to.bind(std::string_view(condition.value));
+}
+
+/// Which condition the fewest jobs before `before` fulfil, as far as that can be told by looking at kLookedAtMax of each. Each has an index in the
+/// order of the list; the one of this condition is walked, and the others are tried on what it gives: a condition of most jobs with one of a
+/// few then costs what the few do.
+std::size_t rarest_of(Connection& connection, const std::vector<Condition>& conditions, std::int64_t before) {
+  constexpr int kLookedAtMax = 2000;
+  std::size_t rarest = 0;
+  std::int64_t count_min = kLookedAtMax + 1;
+  for (std::size_t i = 0; i < conditions.size() && conditions.size() > 1; ++i) {
+    const Condition& condition = conditions[i];
+    const std::string where = condition.is_label ? "label WHERE name = ?3 AND value = ?4"
+                                                 : "job WHERE deleted = 0 AND " + condition.name + " = ?4";
+    Statement row = connection.prepare_once("SELECT count(*) FROM (SELECT 1 FROM " + where +
+                                            " AND job_key < ?1 LIMIT ?2)");
+    row.bind(before).bind(std::int64_t{kLookedAtMax});
+    bind_condition(row, condition);
+    if (!row.step() || row.integer(0) >= count_min) continue;
+    count_min = row.integer(0);
+    rarest = i;
+  }
+  return rarest;
+}
+
 }  // namespace
 
 std::optional<JobRow> find_job_row(Connection& connection, std::int64_t job_key) {
@@ -82,26 +128,33 @@ std::optional<JobRow> oldest_queued_row(Connection& connection) {
 
 std::vector<JobRow> list_job_rows(Connection& connection, const JobFilter& filter, std::int64_t before,
                                   std::size_t limit, std::size_t spec_bytes_max) {
-  std::string sql = COLONY_JOB_COLUMNS " AND job_key < ?";
-  if (filter.state) sql += " AND state = ?";
-  if (filter.kind) sql += " AND kind = ?";
-  if (filter.name) sql += " AND name = ?";
-  for (std::size_t i = 0; i < filter.labels.size(); ++i) {
-    sql += " AND job_key IN (SELECT job_key FROM label WHERE name = ? AND value = ?)";
+  const std::vector<Condition> conditions = conditions_of(filter);
+  const std::size_t rarest = rarest_of(connection, conditions, before);
+  std::string sql = COLONY_JOB_COLUMNS " AND job_key < ?1";
+  for (std::size_t i = 0; i < conditions.size(); ++i) {
+    const std::string first = "?" + std::to_string(2 * i + 3), second = "?" + std::to_string(2 * i + 4);
+    if (!conditions[i].is_label) {
+      // With the unary plus SQLite does not walk this condition's index.
+      sql += std::string(" AND ") + (i == rarest ? "" : "+") + conditions[i].name + " = " + second;
+    } else if (i == rarest) {
+      const std::string_view from = "FROM job ";
+      sql.replace(sql.find(from), from.size(),
+                  "FROM (SELECT job_key FROM label WHERE name = " + first + " AND value = " + second +
+                      ") CROSS JOIN job USING (job_key) ");
+    } else {
+      sql += " AND EXISTS (SELECT 1 FROM label WHERE label.job_key = job.job_key AND label.name = " + first +
+             " AND label.value = " + second + ")";
+    }
   }
-  sql += " ORDER BY job_key DESC LIMIT ?";
+  sql += " ORDER BY job_key DESC LIMIT ?2";
   Statement row = connection.prepare_once(sql);
-  row.bind(before);
-  if (filter.state) row.bind(name_of(*filter.state));
-  if (filter.kind) row.bind(std::string_view(*filter.kind));
-  if (filter.name) row.bind(std::string_view(*filter.name));
-  for (const auto& [name, value] : filter.labels) row.bind(std::string_view(name)).bind(std::string_view(value));
-  row.bind(static_cast<std::int64_t>(limit));
+  row.bind(before).bind(static_cast<std::int64_t>(limit));
+  for (const Condition& condition : conditions) bind_condition(row, condition);
   std::vector<JobRow> jobs;
   std::size_t spec_bytes = 0;
   while ((jobs.empty() || spec_bytes <= spec_bytes_max) && row.step()) {
     jobs.push_back(row_at(row));
-    spec_bytes += jobs.back().spec_json.size();
+    spec_bytes += jobs.back().spec_json.size() + jobs.back().origin_json.size();
   }
   for (JobRow& job : jobs) read_labels(connection, job);
   return jobs;
@@ -167,13 +220,22 @@ void update_job_row(Connection& connection, const JobRow& job) {
   to.bind_text_or_null(job.result_json).bind(job.job_key).run();
 }
 
-std::optional<UsedKey> find_used_key(Connection& connection, const NewJob& job) {
+Result<std::optional<JobRow>> find_submitted_row(Connection& connection, const NewJob& job) {
+  if (job.idempotency_key.empty()) return std::optional<JobRow>();
   Statement& row = connection.prepared("SELECT job_key, body_hash FROM idempotency WHERE submitted_by = ? AND key = ?");
   row.bind(std::string_view(job.submitted_by)).bind(std::string_view(job.idempotency_key));
-  if (!row.step()) return std::nullopt;
-  UsedKey used{row.integer(0), row.text(1)};
+  if (!row.step()) return std::optional<JobRow>();
+  const std::int64_t job_key = row.integer(0);
+  const bool is_same = row.text(1) == job.body_hash;
   row.reset();
-  return used;
+  if (!is_same) {
+    return Error{ErrorCode::kKeyReused,
+                 "the idempotency key was used with another body",
+                 {{"Idempotency-Key", "used before with another body"}}};
+  }
+  std::optional<JobRow> same = find_job_row(connection, job_key);
+  CHECK(same.has_value());  // a key goes with its job
+  return same;
 }
 
 void insert_used_key(Connection& connection, const NewJob& job, std::int64_t job_key) {
@@ -204,6 +266,13 @@ std::vector<LogRow> read_log_rows(Connection& connection, std::int64_t job_key, 
   std::vector<LogRow> lines;
   while (row.step()) lines.push_back({row.integer(0), row.text(1), row.text(2), row.text(3), row.text(4)});
   return lines;
+}
+
+void mark_unmade_jobs_deleted(Connection& connection) {
+  Statement unmade = connection.prepare_once("SELECT job_key FROM job WHERE deleted = 2");
+  std::vector<std::int64_t> job_keys;
+  while (unmade.step()) job_keys.push_back(unmade.integer(0));
+  for (const std::int64_t job_key : job_keys) mark_job_deleted(connection, job_key);
 }
 
 void mark_job_deleted(Connection& connection, std::int64_t job_key) {

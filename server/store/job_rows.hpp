@@ -32,11 +32,8 @@ std::int64_t insert_job_row(Connection& connection, const NewJob& job);
 /// Writes back everything that can change: state, reason, detail, command, wall times, revision, last_seq, digest, counts, time.
 void update_job_row(Connection& connection, const JobRow& job);
 
-struct UsedKey {
-  std::int64_t job_key = 0;
-  std::string body_hash;
-};
-std::optional<UsedKey> find_used_key(Connection& connection, const NewJob& job);
+/// The job that the key of `job` made, if it was used with the same body; kKeyReused with another.
+Result<std::optional<JobRow>> find_submitted_row(Connection& connection, const NewJob& job);
 void insert_used_key(Connection& connection, const NewJob& job, std::int64_t job_key);
 
 void insert_log_row(Connection& connection, std::int64_t job_key, const std::string& level, const std::string& message,
@@ -44,6 +41,10 @@ void insert_log_row(Connection& connection, std::int64_t job_key, const std::str
 std::vector<LogRow> read_log_rows(Connection& connection, std::int64_t job_key, std::int64_t after_index,
                                   std::size_t limit);
 
+/// What `deleted` says of a job that is being made, piece by piece: unseen as well, and swept if it is found at a start.
+inline constexpr int kBeingMade = 2;
+/// Turns what was being made when the process died into what is to be swept.
+void mark_unmade_jobs_deleted(Connection& connection);
 /// Takes the job out of every reader's sight, and frees its idempotency key and labels.
 void mark_job_deleted(Connection& connection, std::int64_t job_key);
 /// Removes up to about `seqs` events of one job marked deleted, at last the job itself; false if none is marked.

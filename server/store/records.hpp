@@ -23,6 +23,10 @@ bool may_follow(JobState from, JobState to);
 /// What a person asks of a job. kResumeStorage is the service's own: it resumes only what stopped for reason "storage".
 enum class JobCommand { kCancel, kPause, kResume, kResumeStorage };
 
+/// Kinds of jobs: what grows, and what verifies the history of another.
+inline constexpr std::string_view kColonyKind = "colony";
+inline constexpr std::string_view kVerifyKind = "verify";
+
 /// What a client submitted, after validation, in the form that is stored. `spec_json` is the complete normalised job spec.
 struct NewJob {
   std::string kind = "colony";              // or "verify"

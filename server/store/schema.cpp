@@ -203,6 +203,7 @@ CREATE TABLE token (
 ALTER TABLE job ADD COLUMN origin TEXT;
 ALTER TABLE job ADD COLUMN result TEXT;
 ALTER TABLE job_log ADD COLUMN actor TEXT NOT NULL DEFAULT '';
+CREATE INDEX job_by_kind ON job (kind, job_key) WHERE deleted = 0;
 )sql";
 
 constexpr std::array<const char*, 4> kMigrations = {kVersion1, kVersion2, kVersion3, kVersion4};  // kMigrations[v] leads from version v to v + 1

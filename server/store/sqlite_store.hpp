@@ -20,6 +20,9 @@ class SqliteStore final : public Store {
   ~SqliteStore() override;
 
   Result<Submitted> create_job(const NewJob& job, std::size_t queued_max) override;
+  Result<std::optional<JobRow>> find_submitted(const NewJob& job) override;
+  Result<Submitted> fork_job(const NewJob& job, std::int64_t source_key, const ForkTail& tail, std::size_t queued_max,
+                             const std::atomic<bool>* stop) override;
   Result<JobRow> find_job(const std::string& id) override;
   Result<JobRow> find_job(std::int64_t job_key) override;
   Result<JobPage> list_jobs(const JobFilter& filter, std::size_t limit, const std::string& cursor) override;
@@ -31,9 +34,11 @@ class SqliteStore final : public Store {
                             const std::string& detail) override;
   Result<Commanded> command_job(std::int64_t job_key, JobCommand command) override;
   Status delete_job(std::int64_t job_key) override;
+  Result<std::vector<JobRow>> expire_jobs(const RetentionLimits& limits, std::int64_t now_ms) override;
   Result<std::vector<JobRow>> running_jobs() override;
 
   void append_events(EventBatch batch, std::function<void(const Status&)> committed) override;
+  std::uint64_t commit_count() const override { return writer_->commit_count(); }
   Status flush() override;
   Result<std::vector<Event>> read_events(std::int64_t job_key, const EventFilter& filter, std::size_t limit) override;
   Result<std::uint64_t> seq_at(std::int64_t job_key, double at_h) override;

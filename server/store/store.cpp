@@ -47,6 +47,7 @@ SqliteStore::SqliteStore(const StoreConfig& config, std::unique_ptr<DataDir> dir
   if (!salt.step()) throw DbError(SQLITE_CORRUPT, "the cursor salt is missing");
   cursor_salt_ = salt.integer(0);
   salt.reset();
+  mark_unmade_jobs_deleted(*write_connection_);  // before anybody reads; the sweeper does the rest
   readers_ = std::make_unique<ReaderPool>(dir_->database_path(), kReaders);
   const WriterLimits limits{config_.batch_rows_max, std::chrono::milliseconds(config_.batch_wait_ms),
                             config_.queued_events_max};

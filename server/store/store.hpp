@@ -5,6 +5,7 @@
 // Threads: every function from any thread.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -52,6 +53,21 @@ struct EventBatch {
   std::vector<Event> events;               // dense, following last_seq
   std::vector<SeriesRow> series;           // hourly rows
   std::uint64_t cell_count = 0, active_count = 0, passive_count = 0, senescent_count = 0;   // after the last event
+  std::string result_json;                 // with the `finished` event of a job of kind "verify"; else empty
+};
+
+/// Where a fork leaves its origin, and what its row says there.
+struct ForkTail {
+  std::uint64_t at_seq = 0;                // the last event copied; not `finished`
+  double time_h = 0.0;
+  Digest digest;
+  std::uint64_t cell_count = 0, active_count = 0, passive_count = 0, senescent_count = 0;
+};
+
+/// Which ended jobs may go. 0: no bound. A label keep=true keeps a job, and so does a verify job that has not ended.
+struct RetentionLimits {
+  std::uint64_t keep_days = 0;             // since it ended
+  std::uint64_t keep_bytes = 0;            // of the histories of all ended jobs; the oldest end goes first
 };
 
 class Store {
@@ -67,6 +83,13 @@ class Store {
   /// A used key with the same body hash returns the same job (created = false); with another, kKeyReused.
   /// More than `queued_max` queued jobs: kBusy.
   virtual Result<Submitted> create_job(const NewJob& job, std::size_t queued_max) = 0;
+  /// The job that `job`'s idempotency key made before, if it did; kKeyReused as above. Looks only.
+  virtual Result<std::optional<JobRow>> find_submitted(const NewJob& job) = 0;
+  /// As create_job, but the job begins with a copy of the rows of `source_key` up to tail.at_seq: events, placements, woken, hourly
+  /// series, index by cell. Copied in pieces, so that other writes come between; nobody sees the job before all is there, and a crash
+  /// leaves nothing. `stop` ends it (kUnavailable). kNotFound when the source goes meanwhile, kInternal when the copy does not fit the tail.
+  virtual Result<Submitted> fork_job(const NewJob& job, std::int64_t source_key, const ForkTail& tail, std::size_t queued_max,
+                                     const std::atomic<bool>* stop) = 0;
   virtual Result<JobRow> find_job(const std::string& id) = 0;
   virtual Result<JobRow> find_job(std::int64_t job_key) = 0;
   virtual Result<JobPage> list_jobs(const JobFilter& filter, std::size_t limit, const std::string& cursor) = 0;
@@ -91,6 +114,9 @@ class Store {
   virtual Result<Commanded> command_job(std::int64_t job_key, JobCommand command) = 0;
   /// Only terminal jobs (else kConflict); events, placements, series and log go with it.
   virtual Status delete_job(std::int64_t job_key) = 0;
+  /// Marks as deleted what the limits let go at `now_ms` (since 1970): first by age, then, once nothing is being removed any more, by
+  /// bytes. Returns the rows marked, at most 100 a call; their histories go as with delete_job.
+  virtual Result<std::vector<JobRow>> expire_jobs(const RetentionLimits& limits, std::int64_t now_ms) = 0;
   /// Every job in state running (after a crash).
   virtual Result<std::vector<JobRow>> running_jobs() = 0;
 
@@ -99,6 +125,9 @@ class Store {
   /// (or with the error: then nothing of this batch was stored); it must not call the store. Batches of a job commit in the
   /// order given; after a failed one the later ones fail too (kConflict), because seq stays dense. Only of running jobs.
   virtual void append_events(EventBatch batch, std::function<void(const Status&)> committed) = 0;
+  /// Grows with every commit, before whoever waits for it or is told of it hears. While it stands, every reading is the same as one made
+  /// after it was last asked for.
+  virtual std::uint64_t commit_count() const = 0;
   /// Waits until everything queued before is committed.
   virtual Status flush() = 0;
   /// Up to `limit` events by ascending seq. Complete: placement and woken rows joined.

@@ -84,18 +84,9 @@ Result<Store::Commanded> command_resume(Connection& connection, JobRow job, bool
 
 Result<Store::Submitted> SqliteStore::create_job(const NewJob& job, std::size_t queued_max) {
   return write<Submitted>([&](Connection& connection) -> Result<Submitted> {
-    if (!job.idempotency_key.empty()) {
-      if (const auto used = find_used_key(connection, job)) {
-        if (used->body_hash != job.body_hash) {
-          return Error{ErrorCode::kKeyReused,
-                       "the idempotency key was used with another body",
-                       {{"Idempotency-Key", "used before with another body"}}};
-        }
-        std::optional<JobRow> same = find_job_row(connection, used->job_key);
-        if (!same) return no_job();
-        return Submitted{std::move(*same), false};
-      }
-    }
+    auto same = find_submitted_row(connection, job);
+    if (!same) return same.error();
+    if (*same) return Submitted{std::move(**same), false};
     const std::uint64_t queued = count_queued_rows(connection);
     if (queued >= queued_max) {
       return Error{ErrorCode::kBusy,
@@ -108,6 +99,11 @@ Result<Store::Submitted> SqliteStore::create_job(const NewJob& job, std::size_t 
     if (!row) return no_job();
     return Submitted{std::move(*row), true};
   });
+}
+
+Result<std::optional<JobRow>> SqliteStore::find_submitted(const NewJob& job) {
+  return readers_->read(
+      [&](Connection& connection) -> Result<std::optional<JobRow>> { return find_submitted_row(connection, job); });
 }
 
 Result<JobRow> SqliteStore::find_job(const std::string& id) {
@@ -147,7 +143,7 @@ Result<JobPage> SqliteStore::list_jobs(const JobFilter& filter, std::size_t limi
     // bytes as well: it may have fewer items than asked for, and then `next`.
     page.items = list_job_rows(connection, filter, before, limit + 1, kPageSpecBytesMax);
     std::size_t spec_bytes = 0;
-    for (const JobRow& job : page.items) spec_bytes += job.spec_json.size();
+    for (const JobRow& job : page.items) spec_bytes += job.spec_json.size() + job.origin_json.size();
     if (page.items.size() > limit || (page.items.size() > 1 && spec_bytes > kPageSpecBytesMax)) {
       page.items.pop_back();
       page.next = cursor_text(page.items.back().job_key, cursor_salt_);
@@ -206,6 +202,7 @@ Result<JobRow> SqliteStore::finish_job(const EventBatch& last, JobState state, c
         if (!may_follow(job->state, state)) return wrong_state(*job);
         const Status appended = append_batch(connection, last, *job);
         if (!appended) return appended.error();
+        job->result_json = last.result_json;
         change_state(connection, *job, state, reason, detail);
         return std::move(*job);
       },

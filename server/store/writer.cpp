@@ -162,6 +162,7 @@ bool Writer::try_batch(std::span<WriteTask> tasks, std::vector<Status>& results)
       results.push_back(std::move(status));
     }
     connection_.execute("COMMIT");
+    commit_count_.fetch_add(1);
     return true;
   } catch (const DbError& error) {
     undo_batch();
@@ -175,6 +176,7 @@ bool Writer::try_batch(std::span<WriteTask> tasks, std::vector<Status>& results)
 }
 
 void Writer::undo_batch() {
+  commit_count_.fetch_add(1);  // a commit that failed may have come further than it says
   try {
     if (connection_.in_transaction()) connection_.execute("ROLLBACK");
   } catch (const std::exception&) {

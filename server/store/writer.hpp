@@ -8,6 +8,7 @@
 // Threads: every function from any thread but the writer's own (submit_* and destruction).
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
@@ -52,6 +53,7 @@ class Writer {
   void submit_bulk(WriteTask task);
   /// There is something to sweep.
   void wake_sweep();
+  std::uint64_t commit_count() const { return commit_count_.load(); }
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -68,6 +70,7 @@ class Writer {
   const WriterLimits limits_;  // fixed after construction
   const std::function<bool(Connection&)> sweep_;
 
+  std::atomic<std::uint64_t> commit_count_{0};
   std::mutex mutex_;  // guards everything below
   std::condition_variable work_;
   std::condition_variable room_;

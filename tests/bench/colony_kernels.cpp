@@ -155,7 +155,7 @@ void select_inside(benchmark::State& state) {
 }
 BENCHMARK(select_inside);
 
-void flag_deformed(benchmark::State& state) {
+void sum_deformed(benchmark::State& state) {
   const Colony& colony = grown().colony();
   const std::vector<const Body*> near = testing::neighbours_of(colony, CellId{150});
   OverlapScratch scratch;
@@ -165,7 +165,7 @@ void flag_deformed(benchmark::State& state) {
     benchmark::DoNotOptimize(deformed_mass(colony.body(CellId{150}), near, ContactRule::kSum, points, scratch));
   items(state, static_cast<double>(scratch.work.field_count), "evaluation");
 }
-BENCHMARK(flag_deformed);
+BENCHMARK(sum_deformed);
 
 void scramble(benchmark::State& state) {
   PointSet points;

@@ -49,11 +49,12 @@ void send_all(int socket, std::string_view text) {
 
 }  // namespace
 
-ColonydProcess::ColonydProcess(const std::string& program, std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), {program, "--listen", "127.0.0.1:0", "--data", data_.path()});
+ColonydProcess::ColonydProcess(const std::string& program, std::vector<std::string> arguments, const std::string& data)
+    : data_(data.empty() ? own_.path() : data) {
+  arguments.insert(arguments.begin(), {program, "--listen", "127.0.0.1:0", "--data", data_});
   std::vector<std::string> environment = clean_environment();
   const std::vector<char*> argv = pointers(arguments), envp = pointers(environment);
-  const std::string log = data_.path() + "/stderr.txt";
+  const std::string log = data_ + "/stderr.txt";
   int out[2];
   if (pipe2(out, O_CLOEXEC) != 0) fail("pipe");
   pid_ = fork();
@@ -151,7 +152,22 @@ std::map<std::string, double> ColonydProcess::thread_cpu_s() const {
   return out;
 }
 
-std::uint64_t ColonydProcess::database_bytes() const { return std::filesystem::file_size(data_.path() + "/colony.db"); }
+std::uint64_t ColonydProcess::database_bytes() const { return std::filesystem::file_size(data_ + "/colony.db"); }
+
+std::uint64_t ColonydProcess::resident_bytes() const {
+  std::ifstream file("/proc/" + std::to_string(pid_) + "/statm");
+  std::uint64_t pages = 0, resident = 0;
+  file >> pages >> resident;
+  return resident * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
+}
+
+std::uint64_t ColonydProcess::peak_memory_bytes() const {
+  std::ifstream file("/proc/" + std::to_string(pid_) + "/status");
+  for (std::string line; std::getline(file, line);) {
+    if (line.starts_with("VmHWM:")) return 1024 * std::stoull(line.substr(6));
+  }
+  throw std::runtime_error("the process has no peak of memory");
+}
 
 double ColonydProcess::finish() {
   kill(pid_, SIGTERM);

@@ -16,8 +16,8 @@ namespace colony::bench {
 
 class ColonydProcess {
  public:
-  /// Returns when it listens.
-  ColonydProcess(const std::string& program, std::vector<std::string> arguments);
+  /// Returns when it listens. `data`: a folder that is there already; empty: one of its own.
+  ColonydProcess(const std::string& program, std::vector<std::string> arguments, const std::string& data = "");
   /// Ended, or killed if finish() was not called.
   ~ColonydProcess();
   ColonydProcess(const ColonydProcess&) = delete;
@@ -30,13 +30,19 @@ class ColonydProcess {
   /// CPU seconds so far of its threads, by name; those that a thread starts bear its name.
   std::map<std::string, double> thread_cpu_s() const;
   std::uint64_t database_bytes() const;
+  /// Resident now.
+  std::uint64_t resident_bytes() const;
+  std::uint16_t port() const { return port_; }
+  /// The most it ever held in memory.
+  std::uint64_t peak_memory_bytes() const;
   /// Ends it by SIGTERM; the CPU seconds of its whole life.
   double finish();
 
  private:
   int connect() const;
 
-  const tests::TempDir data_;
+  const tests::TempDir own_;
+  const std::string data_;
   pid_t pid_ = -1;
   int out_ = -1;
   std::uint16_t port_ = 0;

@@ -33,7 +33,7 @@ std::optional<RunSpec> dish() {
   return spec;
 }
 
-constexpr std::array<Scene, 8> kScenes = {{
+constexpr std::array<Scene, 9> kScenes = {{
     {"paper-180", "preset paper, seed 1, to 180 cells", [] { return spec_of("paper", 1, 180); }},
     {"paper-1k", "preset paper, seed 3 (many colonies end just below), to 1,000 cells",
      [] { return spec_of("paper", 3, 1'000); }},
@@ -52,6 +52,15 @@ constexpr std::array<Scene, 8> kScenes = {{
        spec->params.founders.radius_um = 805.0;
        spec->params.dish.radius_um = 855.0;
        spec->until.cells = 20'000;
+       return spec;
+     }},
+    {"dish-100k", "dish-1m at a tenth of its area: 500 founders; too many cells for what is kept of neighbours",
+     [] {
+       std::optional<RunSpec> spec = dish();
+       spec->params.founders.count /= 10;
+       spec->params.founders.radius_um = 1'863.0;
+       spec->params.dish.radius_um = 1'913.0;
+       spec->until.cells = 100'000;
        return spec;
      }},
     {"paper-100k", "preset paper, seed 1, no generation limit, to 100,000 cells", [] { return unlimited(100'000); }},

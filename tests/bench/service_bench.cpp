@@ -6,6 +6,8 @@
 //          division: a harder test of the service, and of one thread. Status 1 if a digest, or one seq of the stream, is not as it should be.
 //        colony-service-bench parts [--divisions N]
 //          The CPU time a division takes in writer, reader, encoder and growth curve, without an engine.
+//        colony-service-bench estimate [--full 1] [--colonyd PATH]
+//          What a dry run says against what the job takes; status 1 where they differ by more than a factor of 2.
 #include <algorithm>
 #include <charconv>
 #include <chrono>
@@ -23,6 +25,7 @@
 #include "engine/sim/simulator.hpp"
 #include "server/api/codec_spec.hpp"
 #include "tests/bench/colonyd_process.hpp"
+#include "tests/bench/estimate_bench.hpp"
 #include "tests/bench/service_parts.hpp"
 
 namespace colony::bench {
@@ -33,7 +36,7 @@ using Clock = std::chrono::steady_clock;
 struct Options {
   std::uint64_t cells = 100'000, seed = 1, rounds = 1, divisions = 100'000;
   int threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
-  bool quick = false;
+  bool quick = false, full = false;
   std::string colonyd;
 };
 
@@ -180,7 +183,8 @@ int usage() {
   std::fprintf(
       stderr,
       "usage: colony-service-bench job [--cells N] [--threads N] [--seed N] [--rounds N] [--quick 1] [--colonyd PATH]\n"
-      "       colony-service-bench parts [--divisions N]\n");
+      "       colony-service-bench parts [--divisions N]\n"
+      "       colony-service-bench estimate [--full 1] [--colonyd PATH]\n");
   return 2;
 }
 
@@ -199,6 +203,8 @@ int run(const std::vector<std::string>& arguments) {
     if (error != std::errc() || end != value.data() + value.size() || number < 1) return usage();
     if (name == "--quick")
       options.quick = true;
+    else if (name == "--full")
+      options.full = true;
     else if (name == "--cells")
       options.cells = number;
     else if (name == "--seed")
@@ -214,6 +220,7 @@ int run(const std::vector<std::string>& arguments) {
   }
   if (arguments[0] == "job") return run_job(options);
   if (arguments[0] == "parts") return run_parts(options.divisions);
+  if (arguments[0] == "estimate") return run_estimate(options.colonyd, options.full);
   return usage();
 }
 

@@ -52,6 +52,7 @@ class FailingStore final : public server::Store {
   std::function<void()> before_read_events;
   std::function<void(server::JobState, const std::string& reason)> after_set_state;  // that succeeded
   std::function<void()> after_take;                                                  // of a queued job
+  std::function<void(Event&)> tamper;                                                // with each event that is read
   void heal() { appends_until_failure = -1; }
 
   void append_events(server::EventBatch batch, std::function<void(const Status&)> committed) override {
@@ -84,6 +85,14 @@ class FailingStore final : public server::Store {
   Result<Submitted> create_job(const server::NewJob& job, std::size_t queued_max) override {
     return real_->create_job(job, queued_max);
   }
+  Result<std::optional<JobRow>> find_submitted(const server::NewJob& job) override { return real_->find_submitted(job); }
+  Result<Submitted> fork_job(const server::NewJob& job, std::int64_t source_key, const server::ForkTail& tail,
+                             std::size_t queued_max, const std::atomic<bool>* stop) override {
+    return real_->fork_job(job, source_key, tail, queued_max, stop);
+  }
+  Result<std::vector<JobRow>> expire_jobs(const server::RetentionLimits& limits, std::int64_t now_ms) override {
+    return real_->expire_jobs(limits, now_ms);
+  }
   Result<JobRow> find_job(const std::string& id) override { return real_->find_job(id); }
   Result<server::JobPage> list_jobs(const server::JobFilter& filter, std::size_t limit,
                                     const std::string& cursor) override {
@@ -106,13 +115,18 @@ class FailingStore final : public server::Store {
   }
   Status delete_job(std::int64_t job_key) override { return real_->delete_job(job_key); }
   Result<std::vector<JobRow>> running_jobs() override { return real_->running_jobs(); }
+  std::uint64_t commit_count() const override { return real_->commit_count(); }
   Status flush() override { return real_->flush(); }
   server::AnalysisStore& analyses() override { return real_->analyses(); }
   Result<std::vector<Event>> read_events(std::int64_t job_key, const server::EventFilter& filter,
                                          std::size_t limit) override {
     ++event_reads;
     if (before_read_events) before_read_events();
-    return real_->read_events(job_key, filter, limit);
+    auto events = real_->read_events(job_key, filter, limit);
+    if (events && tamper) {
+      for (Event& event : *events) tamper(event);
+    }
+    return events;
   }
   Result<std::uint64_t> seq_at(std::int64_t job_key, double at_h) override { return real_->seq_at(job_key, at_h); }
   Result<std::vector<SeriesRow>> read_series(std::int64_t job_key) override { return real_->read_series(job_key); }

@@ -14,7 +14,7 @@ inline void take_back_to(const std::string& path, int version) {
   if (version < 4) {
     old.execute(
         "DROP TABLE token; ALTER TABLE job DROP COLUMN origin; ALTER TABLE job DROP COLUMN result;"
-        "ALTER TABLE job_log DROP COLUMN actor");
+        "ALTER TABLE job_log DROP COLUMN actor; DROP INDEX job_by_kind");
   }
   if (version < 3) old.execute("DROP TABLE analysis; DROP TABLE analysis_image");
   if (version < 2) {

@@ -11,7 +11,7 @@ import { seeded, within } from './harness/wait.mjs';
 
 const killCount = full ? 50 : 10;
 // Many points a search: it takes milliseconds, so that a kill can come between two events.
-const spec = { name: 'killed', seed: 41, preset: 'paper', until: { cells: full ? 600 : 200 }, model: { search: { points: 4096 } } };
+const spec = { name: 'killed', seed: 41, preset: 'paper', until: { cells: full ? 600 : 200 }, model: { search: { points: 8192 } } };
 
 /** Every row of a table of the only job of DATA, as the sqlite3 shell reads it beside the running server. */
 function rows(data, table) {
@@ -47,8 +47,8 @@ test('kill -9', async (t) => {
   await t.test(`${killCount} times at random events: the same digest and the same rows`, async () => {
     const seed = Number(process.env.COLONY_TEST_SEED ?? 20261122);
     const random = seeded(seed);
-    // The last fifth is the job's own, so that it cannot end while the last kill is on its way.
-    const moments = Array.from({ length: killCount }, () => 1 + Math.floor(random() * 0.8 * reference.last_seq)).sort((a, b) => a - b);
+    // The last third is the job's own, so that it cannot end while the last kill is on its way.
+    const moments = Array.from({ length: killCount }, () => 1 + Math.floor(random() * 0.7 * reference.last_seq)).sort((a, b) => a - b);
     t.diagnostic(`seed ${seed}, kills at events ${moments.join(' ')}`);
     const data = temporaryFolder(t);
     let server = await new Server(data, []).ready();

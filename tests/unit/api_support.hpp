@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 #include <cstdlib>
 #include <filesystem>
 #include <map>
@@ -12,6 +13,7 @@
 #include <vector>
 
 #include "engine/base/check.hpp"
+#include "engine/base/version.hpp"
 #include "engine/sim/simulator.hpp"
 #include "server/api/api.hpp"
 #include "server/http/router.hpp"
@@ -39,7 +41,7 @@ class FakeJobs : public JobService {
     row.reason = "cells";
     row.submitted_by = "local";
     row.created_at = row.started_at = row.finished_at = "2026-01-02T03:04:05.678Z";
-    row.engine_version = "0.1.0";
+    row.engine_version = engine_version_text();
     row.last_seq = history.back().seq;
     row.digest = history.back().digest;
     api::JobSpec job_spec;
@@ -61,7 +63,13 @@ class FakeJobs : public JobService {
   JobFilter asked_filter;
   std::size_t asked_limit = 0;
 
-  JobView view() const { return {row, progress}; }
+  /// last_seq is that of the last event visible.
+  JobView view() const {
+    JobView view{row, progress};
+    const std::size_t visible = std::min(stored, history.size());
+    view.job.last_seq = view.progress.last_seq = visible == 0 ? 0 : history[visible - 1].seq;
+    return view;
+  }
   Status start() override { return Ok{}; }
   void drain() override {}
   Result<Submitted> submit(const NewJob& job) override {
@@ -75,10 +83,31 @@ class FakeJobs : public JobService {
     submitted.push_back(job);
     return Submitted{view(), true};
   }
+  Result<std::optional<JobView>> submitted_before(const NewJob& job) override {
+    const auto at = keys.find(job.idempotency_key);
+    if (job.idempotency_key.empty() || at == keys.end()) return std::optional<JobView>();
+    if (at->second != job.body_hash) return Error{ErrorCode::kKeyReused, "the key was used with another body"};
+    return std::optional<JobView>(view());
+  }
+  Result<ForkPoint> fork_point(const std::string& id, std::optional<double> at_h,
+                               std::optional<std::uint64_t> at_seq) override {
+    if (id != row.id) return missing(id);
+    std::uint64_t seq = at_seq.value_or(history.back().seq - 1);
+    auto colony = std::make_shared<Colony>(spec.params);
+    for (const Event& event : history) {
+      if (event.seq <= seq && (!at_h || event.time_h <= *at_h)) colony->apply(event);
+    }
+    return ForkPoint{row, colony->last_seq(), {colony, std::make_shared<RunSpec>(spec), colony->time_h(), colony->digest()}};
+  }
+  Result<Submitted> fork(const NewJob& job, const ForkPoint&) override { return submit(job); }
   Result<JobView> show(const std::string& id) override {
     if (id != row.id) return missing(id);
     return view();
   }
+  /// Tests change the row without a commit: nothing that was read stands.
+  std::uint64_t commit_count() const override { return does_commit ? ++commits : commits.load(); }
+  mutable std::atomic<std::uint64_t> commits{0};
+  bool does_commit = true;
   Result<Page> list(const JobFilter& filter, std::size_t limit, const std::string& cursor) override {
     asked_filter = filter;
     asked_limit = limit;

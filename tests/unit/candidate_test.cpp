@@ -69,9 +69,12 @@ TEST(GeneTables, DecodeWhatTheDefinitionDecodes) {
           ASSERT_LT(found.unit, 3e-5) << "bits " << bits << " layers " << static_cast<int>(layers) << " string " << i;
           worst = {std::max(worst.um, found.um), std::max(worst.unit, found.unit)};
           for (std::size_t k = 0; k < 2; ++k) {
-            const Box box = Body(exact.bodies[k], params.noise).box();
-            for (int axis = 0; axis < 2; ++axis) {
-              const double extent = std::max(box.high[axis] - frame.pivot_um[axis], frame.pivot_um[axis] - box.low[axis]);
+            // The body lies within a circle of that radius: so do its tangents across any direction.
+            const Body body(exact.bodies[k], params.noise);
+            for (int step = 0; step < 16; ++step) {
+              const auto [sine, cosine] = maths::sincos(maths::kPi * step / 8.0);
+              const Vec3 unit(cosine, sine, 0.0);
+              const double extent = (body.centre_um() - frame.pivot_um).dot(unit) + body.noisy_scale() * body.half_width_um(unit);
               ASSERT_LE(extent, 1.00001 * fast[k].reach + 1e-4);
             }
           }

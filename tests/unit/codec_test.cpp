@@ -253,5 +253,42 @@ TEST(EstimateOfAJob, StaysWithinItsBoundsAndNamesItsBasis) {
   EXPECT_NE(tumour.basis.find("tumour"), std::string_view::npos);
 }
 
+// As measured (colony-service-bench estimate; CPU seconds over threads, so that a busy machine does not count).
+TEST(EstimateOfAJob, IsWithinAFactorOfTwoOfWhatWasMeasured) {
+  struct Measured {
+    const char* spec;
+    int threads;
+    double wall_s, memory_MB, stored_MB;
+  };
+  constexpr Measured kMeasured[] = {
+      {R"({"preset": "paper", "until": {"cells": 1000}})", 1, 0.526, 23.7, 1.24},
+      {R"({"preset": "paper", "until": {"cells": 1000}})", 2, 0.281, 25.6, 1.24},
+      {R"({"preset": "paper", "until": {"cells": 10000}, "model": {"division": {"generation_limit": null}}})", 1, 5.633, 48.1, 11.82},
+      {R"({"preset": "paper", "until": {"cells": 10000}, "model": {"division": {"generation_limit": null}}})", 2, 2.907, 56.5, 11.82},
+      {R"({"preset": "paper", "until": {"time_h": 240}})", 1, 0.123, 21.4, 0.38},
+      {R"({"preset": "paper", "until": {"time_h": 5000}})", 1, 0.499, 23.4, 1.16},
+      {R"({"preset": "paper", "until": {"cells": 500}, "model": {"search": {"population": 64, "generations": 24, "points": 1024}}})", 1,
+       0.820, 22.1, 0.65},
+      {R"({"preset": "young-colony", "until": {"cells": 2000}, "model": {"division": {"generation_limit": null}}})", 1, 3.239, 39.3, 13.39},
+      {R"({"preset": "tumour", "until": {"cells": 3000}})", 1, 2.609, 31.1, 4.12},
+      {R"({"preset": "tumour", "until": {"cells": 3000}})", 2, 1.369, 36.2, 4.12},
+      {R"({"preset": "clonogenic", "until": {"time_h": 150}})", 1, 5.181, 50.5, 11.92},
+      {R"({"preset": "clonogenic", "until": {"cells": 4000}, "model": {"founders": {"count": 340, "radius_um": 3000}}})", 1, 0.746, 33.2,
+       3.58},
+      {R"({"preset": "paper", "until": {"cells": 20000}, "model": {"founders": {"count": 100, "radius_um": 805}, "dish": {"radius_um": 855}}})", 1,
+       12.22, 65.7, 23.12},
+      {R"({"preset": "clonogenic", "until": {"cells": 30000}, "model": {"founders": {"count": 1000, "radius_um": 3000}}})", 1, 13.66, 88.2, 30.71},
+  };
+  for (const Measured& measured : kMeasured) {
+    const Estimate found = estimate(decode(measured.spec)->run, measured.threads);
+    const double ratios[] = {found.wall_s / measured.wall_s, 1e-6 * static_cast<double>(found.memory_bytes) / measured.memory_MB,
+                             1e-6 * static_cast<double>(found.stored_bytes) / measured.stored_MB};
+    for (const double ratio : ratios) {
+      EXPECT_GT(ratio, 0.5) << measured.spec << ' ' << measured.threads;
+      EXPECT_LT(ratio, 2.0) << measured.spec << ' ' << measured.threads;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace colony::server::api

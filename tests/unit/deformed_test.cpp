@@ -25,6 +25,8 @@ struct Points {
     y.push_back(py);
     z.push_back(pz);
   }
+  const std::vector<float>& column(int axis) const { return axis == 0 ? x : axis == 1 ? y : z; }
+  kernel::PointColumns columns() const { return {x.data(), y.data(), z.data()}; }
   std::size_t pad(float with) {  // their number
     const std::size_t n = x.size();
     for (std::vector<float>* column : {&x, &y, &z}) column->resize(n + kernel::kPadding, with);
@@ -36,7 +38,8 @@ NoiseParams noise_of(std::uint32_t number) {
   return number % 4 == 0 ? testing::smooth() : number % 4 == 1 ? NoiseParams{0.45, 5.0, 6.0} : number % 4 == 2 ? NoiseParams{0.40, 8.0, 1.4} : testing::rough();
 }
 
-TEST(FlagDeformed, EqualsItsTwinWithBothRulesOnEveryTarget) {
+// The sums of the points' own coordinates, as multiples of 2^-24, say which points were counted.
+TEST(SumDeformed, EqualsItsTwinWithBothRulesOnEveryTarget) {
   const std::uint32_t scenes = testing::scaled(400U, 5000U);
   std::uint64_t flagged = 0, taken = 0, looked_at = 0;
   for (std::uint32_t number = 1; number <= scenes; ++number) {
@@ -57,18 +60,28 @@ TEST(FlagDeformed, EqualsItsTwinWithBothRulesOnEveryTarget) {
       points.add(static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z()));
     }
     points.pad(0.0F);
+    Points marks;
+    const auto mark = [&] { return static_cast<float>(stream.next_u32() >> 8) * 0x1.0p-24F; };
+    for (std::uint32_t i = 0; i < n; ++i) {
+      const float x = mark(), y = mark();
+      marks.add(x, y, mark());
+    }
+    marks.pad(0.5F);
     for (const bool largest_only : {false, true}) {
-      std::vector<std::uint8_t> expected(n + 1, 7);
+      kernel::DeformedSums expected;
       for (std::size_t i = 0; i < n; ++i) {
-        expected[i] = kernel::is_in_deformed_reference(own, others, largest_only, points.x[i], points.y[i], points.z[i]) ? 1 : 0;
-        flagged += expected[i];
-        taken += kernel::is_inside_reference(own, points.x[i], points.y[i], points.z[i]) && expected[i] == 0 ? 1 : 0;
+        const bool inside = kernel::is_in_deformed_reference(own, others, largest_only, points.x[i], points.y[i], points.z[i]);
+        taken += !inside && kernel::is_inside_reference(own, points.x[i], points.y[i], points.z[i]) ? 1 : 0;
+        if (!inside) continue;
+        ++expected.count;
+        for (int axis = 0; axis < 3; ++axis) expected.sum[axis] += static_cast<double>(marks.column(axis)[i]);
       }
+      flagged += expected.count;
       looked_at += n;
       testing::on_every_target([&](const std::string& name) {
-        std::vector<std::uint8_t> flags(n + 1, 7);  // the last must be left alone
-        kernel::flag_deformed(own, others, largest_only, points.x.data(), points.y.data(), points.z.data(), n, flags.data());
-        ASSERT_EQ(flags, expected) << name << " scene " << number << " largest only " << largest_only;
+        const kernel::DeformedSums sums = kernel::sum_deformed(own, others, largest_only, points.columns(), marks.columns(), n);
+        ASSERT_EQ(sums.count, expected.count) << name << " scene " << number << " largest only " << largest_only;
+        for (int axis = 0; axis < 3; ++axis) ASSERT_EQ(sums.sum[axis], expected.sum[axis]) << name << " scene " << number << " axis " << axis;
       }, number == scenes && largest_only);
       if (HasFatalFailure()) return;
     }
@@ -77,34 +90,95 @@ TEST(FlagDeformed, EqualsItsTwinWithBothRulesOnEveryTarget) {
   EXPECT_GT(taken, looked_at / 50);
 }
 
-TEST(NearestUnflagged, IsTheFirstOfTheNearestAndNoneWhereAllAreFlagged) {
-  for (std::uint32_t number = 1; number <= testing::scaled(400U, 4000U); ++number) {
+TEST(SumDeformed, IsExactOverManyPoints) {
+  // A ball about all points: more of them than a whole number of 32 bits holds the sums of.
+  const Body ball(testing::sphere(50.0, Vec3::Zero()), testing::smooth());
+  Points points, marks;
+  for (int i = 0; i < 65'536; ++i) {
+    points.add(0.25F, 0.25F, 0.25F);
+    marks.add(0x0.ffffffp0F, 0x1.0p-24F, 0.0F);
+  }
+  points.pad(0.0F);
+  const std::size_t n = marks.pad(0.0F);
+  testing::on_every_target([&](const std::string& name) {
+    const kernel::DeformedSums sums = kernel::sum_deformed(kernel::FloatBody(ball, Vec3::Zero()), {}, false, points.columns(), marks.columns(), n);
+    ASSERT_EQ(sums.count, 65'536U) << name;
+    ASSERT_EQ(sums.sum[0], 65'536.0 - 0x1.0p-8) << name;
+    ASSERT_EQ(sums.sum[1], 0x1.0p-8) << name;
+    ASSERT_EQ(sums.sum[2], 0.0) << name;
+  }, false);
+}
+
+TEST(NearestOutside, IsTheFirstOfTheNearestAndNoneWhereAllAreInside) {
+  std::uint64_t by_neighbour = 0, inside_its_band = 0, tied = 0;
+  for (std::uint32_t number = 1; number <= testing::scaled(600U, 6000U); ++number) {
     Stream stream = testing::case_stream(number);
+    const NoiseParams noise = noise_of(number);
+    const bool ties = number % 2 == 0;       // whole coordinates: many distances are equal, exactly
+    const bool all_inside = number % 7 == 0;
+    const Body body(all_inside ? testing::sphere(60.0, Vec3::Zero()) : testing::any_ellipsoid(stream, 2.0), noise);
+    const kernel::FloatBody own(body, Vec3::Zero());
+    std::vector<kernel::FloatBody> others;
+    const std::uint32_t count = all_inside ? 0 : stream.below(5);
+    for (std::uint32_t k = 0; k < count; ++k) others.emplace_back(Body(testing::any_ellipsoid(stream, 14.0), noise), Vec3::Zero());
     Points points;
-    std::vector<std::uint8_t> flags;
-    const std::uint32_t n = 1 + stream.below(100);
-    const bool ties = number % 2 == 0;  // whole coordinates: many distances are equal, exactly
+    const std::uint32_t n = 1 + stream.below(300);
     for (std::uint32_t i = 0; i < n; ++i) {
-      const auto coordinate = [&] {
-        return ties ? static_cast<float>(stream.below(5)) - 2.0F : static_cast<float>(stream.uniform({-9.0, 9.0}));
-      };
+      const auto coordinate = [&] { return ties ? static_cast<float>(stream.below(21)) - 10.0F : static_cast<float>(stream.uniform({-12.0, 12.0})); };
       const float x = coordinate(), y = coordinate();
       points.add(x, y, coordinate());
-      flags.push_back(number % 7 == 0 || stream.below(4) != 0 ? 1 : 0);
     }
     points.pad(0.0F);  // nearer than any, but no points
-    flags.resize(n + kernel::kPadding, 0);
-    std::size_t expected = n;
+    const bool largest_only = number % 3 == 0;
     const auto distance2 = [&](std::size_t i) { return (points.x[i] * points.x[i] + points.y[i] * points.y[i]) + points.z[i] * points.z[i]; };
+    std::size_t expected = n;
     for (std::size_t i = 0; i < n; ++i) {
-      if (flags[i] == 0 && (expected == n || distance2(i) < distance2(expected))) expected = i;
+      if (kernel::is_in_deformed_reference(own, others, largest_only, points.x[i], points.y[i], points.z[i])) continue;
+      tied += expected != n && distance2(i) == distance2(expected) ? 1 : 0;
+      if (expected == n || distance2(i) < distance2(expected)) expected = i;
     }
-    if (number % 7 == 0) {
+    if (all_inside) {
       EXPECT_EQ(expected, n);
     }
+    if (expected < n) {
+      by_neighbour += kernel::is_inside_reference(own, points.x[expected], points.y[expected], points.z[expected]) ? 1 : 0;
+      inside_its_band += std::abs(kernel::smooth_reference(own, points.x[expected], points.y[expected], points.z[expected])) <= own.band ? 1 : 0;
+    }
     testing::on_every_target([&](const std::string& name) {
-      ASSERT_EQ(kernel::nearest_unflagged(points.x.data(), points.y.data(), points.z.data(), n, flags.data()), expected)
-          << name << " case " << number;
+      ASSERT_EQ(kernel::nearest_outside(own, others, largest_only, points.columns(), n), expected) << name << " case " << number;
+    }, false);
+    if (HasFatalFailure()) return;
+  }
+  EXPECT_GT(by_neighbour, 50U);
+  EXPECT_GT(inside_its_band, 50U);
+  EXPECT_GT(tied, 50U);
+}
+
+TEST(KeepInBall, KeepsWhatItsDefinitionSaysInTheirOrder) {
+  for (std::uint32_t number = 1; number <= 100; ++number) {
+    Stream stream = testing::case_stream(number);
+    Points points;
+    const std::uint32_t n = 1 + stream.below(300);
+    const bool flat = number % 2 == 0;
+    for (std::uint32_t i = 0; i < n; ++i) {
+      const auto unit = [&] { return static_cast<float>(stream.uniform()); };
+      const float x = unit(), y = unit();
+      points.add(x, y, flat ? 0.5F : unit());
+    }
+    points.pad(0.5F);  // the centre: kept, if it were a point
+    const float radius = 18.0F, low_z = flat ? -1.0F : static_cast<float>(stream.uniform({-18.0, 0.0}));
+    Points expected;
+    for (std::size_t i = 0; i < n; ++i) {
+      const float x = 2.0F * points.x[i] - 1.0F, y = 2.0F * points.y[i] - 1.0F, z = 2.0F * points.z[i] - 1.0F;
+      if ((x * x + y * y) + z * z <= 1.0F && radius * z >= low_z) expected.add(radius * x, radius * y, radius * z);
+    }
+    testing::on_every_target([&](const std::string& name) {
+      Points found = points;
+      const std::size_t kept = kernel::keep_in_ball(radius, low_z, found.x.data(), found.y.data(), found.z.data(), n);
+      ASSERT_EQ(kept, expected.x.size()) << name << " case " << number;
+      for (std::size_t i = 0; i < kept; ++i) {
+        ASSERT_TRUE(found.x[i] == expected.x[i] && found.y[i] == expected.y[i] && found.z[i] == expected.z[i]) << name << " case " << number << " point " << i;
+      }
     }, false);
     if (HasFatalFailure()) return;
   }

@@ -90,11 +90,12 @@ class LiveStream : public ::testing::Test {
   http::BodySource& open(const std::string& kinds = "") {
     api::StreamWish wish;
     if (kinds == "progress") wish.events = false;
-    stream = std::make_unique<api::EventStream>(jobs, jobs.view(), wish, [this] { return now; });
+    stream = std::make_unique<api::EventStream>(jobs, feeds, jobs.view(), wish, [this] { return now; });
     stream->on_ready([] {});
     return *stream;
   }
   std::string pull_until(http::BodySource::Pull wanted) {
+    announce();
     std::string out;
     for (int i = 0; i < 1000; ++i) {
       if (stream->pull(out) == wanted) return out;
@@ -102,7 +103,12 @@ class LiveStream : public ::testing::Test {
     ADD_FAILURE() << "the stream did not come to this";
     return out;
   }
+  void announce() {
+    jobs.waker();
+    feeds.refresh_stale();
+  }
   FakeJobs jobs;
+  api::Feeds feeds{jobs, api::Feeds::Mode::kByHand};
   std::chrono::steady_clock::time_point now{std::chrono::hours(1)};
   std::unique_ptr<api::EventStream> stream;
 };
@@ -131,6 +137,7 @@ TEST_F(LiveStream, ProgressComesAtMostFiveTimesASecond) {
   int messages = 0;
   for (int step = 0; step < 1000; ++step) {  // 10 s in steps of 10 ms, news at every one
     ++jobs.progress.cells;
+    announce();
     std::string out;
     ASSERT_EQ(stream->pull(out), http::BodySource::Pull::kWait);
     EXPECT_THAT(out, Not(HasSubstr("id: ")));

@@ -313,7 +313,6 @@ TEST(Jobs, WhatBelongsToLaterVersionsIsNotThere) {
   for (const std::string& path : {std::string("/v1/sweeps"), std::string("/v1/tokens"), std::string("/docs")}) {
     EXPECT_EQ(fixture.get(path).status, 404) << path;
   }
-  EXPECT_EQ(fixture.post(kJob + "/fork", "{}").status, 404);
   EXPECT_EQ(fixture.ask("PATCH", kJob).status, 405);
 }
 

@@ -255,5 +255,60 @@ TEST(HttpStream, ASourceIsPulledAgainWhenItAskedForIt) {
   EXPECT_TRUE(reply.is_complete);
 }
 
+/// Gives by turns from memory and by a pull, and notices where it is called.
+class HalfReady : public BodySource {
+ public:
+  explicit HalfReady(std::atomic<bool>& is_wrong) : is_wrong_(is_wrong) {}
+  void on_ready(std::function<void()> wake) override { wake_ = std::move(wake); }
+  Pull pull(std::string& out) override {
+    if (count_ == 0) worker_ = std::this_thread::get_id();
+    if (count_ % 3 != 0 || std::this_thread::get_id() != worker_) is_wrong_ = true;
+    out += "<" + std::to_string(count_) + ">";
+    return next();
+  }
+  std::optional<Ready> pull_now(std::string& out) override {
+    if (count_ == 0 || std::this_thread::get_id() == worker_) is_wrong_ = true;
+    if (count_ % 3 == 0) return std::nullopt;
+    if (count_ % 3 == 1) out += "own;";
+    auto shared = std::make_shared<const std::string>(std::to_string(count_) + ":");
+    return Ready{next(), std::move(shared)};
+  }
+
+ private:
+  Pull next() {
+    if (++count_ == 300) return Pull::kEnd;
+    if (count_ % 2 == 0) return Pull::kMore;
+    wake_();
+    return Pull::kWait;
+  }
+  std::atomic<bool>& is_wrong_;
+  std::function<void()> wake_;
+  std::thread::id worker_;
+  int count_ = 0;
+};
+
+TEST(HttpStream, WhatIsReadyNeedsNoWorkerAndSharedBytesGoFirst) {
+  ServerConfig config;
+  config.worker_threads = 1;
+  config.stream_keep_alive_ms = 3'600'000;  // only wakes lead on
+  std::atomic<bool> is_wrong{false};
+  TestServer server(
+      [&is_wrong](Router& router) {
+        router.add("GET", "/s", [&is_wrong](const Request&) { return streamed(std::make_unique<HalfReady>(is_wrong)); });
+      },
+      config);
+  server.run();
+  std::string expected;
+  for (int i = 0; i < 300; ++i) {
+    const std::string number = std::to_string(i);
+    expected += i % 3 == 0 ? "<" + number + ">" : number + (i % 3 == 1 ? ":own;" : ":");
+  }
+  RawClient client(server.port());
+  const Reply reply = client.ask(get("/s"));
+  EXPECT_TRUE(reply.is_complete);
+  EXPECT_EQ(reply.body, expected);
+  EXPECT_FALSE(is_wrong);
+}
+
 }  // namespace
 }  // namespace colony::server::http

@@ -49,6 +49,38 @@ inline NewJob new_job(std::uint64_t seed, std::uint64_t cells) {
   return job;
 }
 
+/// The codec of forks and verifications in these tests: an origin is "<at_seq>;<spec>;<its origin>", a task "<job id> <to_seq>".
+inline VerifyCodec test_verify_codec() {
+  VerifyCodec codec;
+  codec.task = [](const std::string& text) -> Result<VerifyTask> {
+    const std::size_t blank = text.find(' ');
+    if (blank == std::string::npos) return Error{ErrorCode::kInvalid, "not a task"};
+    return VerifyTask{text.substr(0, blank), std::stoull(text.substr(blank + 1))};
+  };
+  codec.stretches = [](const JobRow& job) -> Result<std::vector<Stretch>> {
+    std::vector<Stretch> stretches = {{UINT64_MAX, *decode(job.spec_json)}};
+    for (std::string origin = job.origin_json; !origin.empty();) {
+      const std::size_t first = origin.find(';'), second = origin.find(';', first + 1);
+      stretches.insert(stretches.begin(),
+                       {std::stoull(origin.substr(0, first)), *decode(origin.substr(first + 1, second - first - 1))});
+      origin = origin.substr(second + 1);
+    }
+    return stretches;
+  };
+  codec.result = [](const VerifyOutcome& outcome) {
+    return outcome.identical ? "identical " + std::to_string(outcome.events)
+                             : "different at " + std::to_string(outcome.first_differing_seq.value_or(0));
+  };
+  return codec;
+}
+
+inline NewJob verification_of(const JobRow& target) {
+  NewJob job;
+  job.kind = kVerifyKind;
+  job.spec_json = target.id + " " + std::to_string(target.last_seq);
+  return job;
+}
+
 /// Waits for a job by its announcements alone.
 class Watch {
  public:
@@ -102,13 +134,23 @@ class JobsTest : public testing::Test {
     ASSERT_TRUE(store) << store.error().message;
     store_ = std::make_unique<FailingStore>(std::move(*store));
     config.storage_retry_ms = 1;
-    service_ = JobService::create(*store_, config, decode);
+    service_ = JobService::create(*store_, config, decode, test_verify_codec());
   }
   void start() { ASSERT_TRUE(service_->start()); }
   std::string submit(const NewJob& job) {
     const auto submitted = service_->submit(job);
     EXPECT_TRUE(submitted) << submitted.error().message;
     return submitted->view.job.id;
+  }
+  /// A fork that goes on to so many cells by this seed.
+  std::string fork(const std::string& id, std::uint64_t at_seq, std::uint64_t seed, std::uint64_t cells) {
+    const auto point = service_->fork_point(id, std::nullopt, at_seq);
+    EXPECT_TRUE(point) << point.error().message;
+    NewJob job = new_job(seed, cells);
+    job.origin_json = std::to_string(point->at_seq) + ";" + point->origin.spec_json + ";" + point->origin.origin_json;
+    const auto made = service_->fork(job, *point);
+    EXPECT_TRUE(made) << made.error().message;
+    return made->view.job.id;
   }
   std::vector<Event> events(const std::string& id) { return *service_->events(id, {}, 1'000'000); }
   /// What a simulator makes of the same spec without store, pauses or restarts.

@@ -75,6 +75,31 @@ TEST_F(JobsTest, PauseAndResumeChangeNothing) {
   EXPECT_EQ(service_->cancel(id).error().code, ErrorCode::kConflict);
 }
 
+TEST_F(JobsTest, APaceChangesNothingButTheTime) {
+  JobsConfig config;
+  config.events_per_s_max = 2000;
+  open(config);
+  start();
+  const std::string id = submit(new_job(3, 15));
+  Watch(*service_, id).until_ended();
+  EXPECT_EQ(events(id), undisturbed(3, 15));
+}
+
+// Of a job that makes an event a second none of what is asked may wait for the next.
+TEST_F(JobsTest, ASlowPaceKeepsNobodyWaiting) {
+  JobsConfig config;
+  config.events_per_s_max = 1;
+  open(config);
+  start();
+  const std::string id = submit(new_job(4, 100'000));
+  Watch watch(*service_, id);
+  watch.until_seq(1);
+  EXPECT_EQ(service_->pause(id)->view.job.state, JobState::kPaused);
+  EXPECT_TRUE(service_->resume(id)->changed);
+  watch.until([](const JobView& view) { return view.job.state == JobState::kRunning; });
+  EXPECT_EQ(service_->cancel(id)->view.job.state, JobState::kCancelled);
+}
+
 TEST_F(JobsTest, CancelEndsARunningJob) {
   start();
   const std::string id = submit(new_job(4, 100'000));
@@ -237,9 +262,33 @@ TEST_F(JobsTest, ThePastIsAFoldOfTheEvents) {
     EXPECT_EQ(row.cell_count, then->colony->cells().size());
     EXPECT_EQ(row.radius_um, measure_series(*then->colony, row.time_h).radius_um);
   }
-  EXPECT_EQ(service_->series(job.id, 11)->size(), 11U);
+  EXPECT_EQ(*service_->series(job.id, 11), *rows);
   EXPECT_EQ(service_->series(job.id, 0).error().code, ErrorCode::kInvalid);
   EXPECT_EQ(service_->series(job.id, 10'001).error().code, ErrorCode::kInvalid);
+}
+
+// The curve is led on from question to question; what it says must not depend on when it was asked.
+TEST_F(JobsTest, TheGrowthCurveOfAGrowingJobIsThatOfAFold) {
+  start();
+  const std::string id = submit(new_job(6, 60));
+  Watch watch(*service_, id);
+  for (const std::uint64_t seq : {3U, 10U, 11U, 60U}) {
+    watch.until_seq(seq);
+    ASSERT_TRUE(service_->series(id, 7));
+  }
+  const JobRow job = watch.until_ended().job;
+  const std::vector<Event> history = events(id);
+  for (const std::size_t points : {1U, 2U, 33U}) {
+    const auto rows = service_->series(id, points);
+    ASSERT_EQ(rows->size(), points);
+    Colony colony(decode(job.spec_json)->params);
+    auto event = history.begin();
+    for (const SeriesRow& row : *rows) {
+      for (; event != history.end() && event->time_h <= row.time_h; ++event) colony.apply(*event);
+      EXPECT_EQ(row, measure_series(colony, row.time_h));
+    }
+    EXPECT_EQ(rows->back().time_h, job.time_h);
+  }
 }
 
 }  // namespace

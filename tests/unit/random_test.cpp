@@ -11,6 +11,7 @@
 #include <rapidcheck/gtest.h>
 
 #include "engine/base/check.hpp"
+#include "engine/random/philox_kernel.hpp"
 #include "engine/random/sobol.hpp"
 #include "engine/random/sobol_kernel.hpp"
 #include "engine/random/stream.hpp"
@@ -33,11 +34,13 @@ TEST(Philox, GivesRandom123sKnownAnswers) {
 
 TEST(Stream, CounterWordsAreCellOrdinalPurposeWithLaneAndBlock) {
   const Seed seed = 0x0012345689abcdefULL;
-  Stream stream(seed, CellId{77}, 5, Purpose::kSearch, 0xabcdef);
-  for (std::uint32_t block = 0; block < 14; ++block) {  // blocks are made one, then four at a time
-    const Words4 words = philox4x32_10({77, 5, (7U << 24) | 0xabcdefU, block}, {0x89abcdef, 0x00123456});
-    for (const std::uint32_t word : words) EXPECT_EQ(stream.next_u32(), word);
-  }
+  testing::on_every_target([&](const std::string& name) {
+    Stream stream(seed, CellId{77}, 5, Purpose::kSearch, 0xabcdef);
+    for (std::uint32_t block = 0; block < 2 + 3 * kPhiloxBlocks; ++block) {  // blocks are made one, then many at a time
+      const Words4 words = philox4x32_10({77, 5, (7U << 24) | 0xabcdefU, block}, {0x89abcdef, 0x00123456});
+      for (const std::uint32_t word : words) ASSERT_EQ(stream.next_u32(), word) << name << " block " << block;
+    }
+  });
 }
 
 TEST(Stream, NoTwoAddressesShareABlock) {
@@ -233,6 +236,9 @@ TEST(TiledSobol, IsTheSameSetInRunsOfOneElementaryInterval) {
       PointSet plain, tiled;
       scrambled_sobol(n, {set, set + 7, 99 * set}, plain);
       tiled_sobol(n, {set, set + 7, 99 * set}, tiled);
+      PointSet plane = plain;  // what it held before must not matter
+      tiled_sobol_plane(n, {set, set + 7, 99 * set}, plane);
+      for (std::size_t i = 0; i < n; ++i) ASSERT_TRUE(plane.x[i] == tiled.x[i] && plane.y[i] == tiled.y[i] && plane.z[i] == 0.0F) << n << " point " << i;
       std::vector<Point> a, b;
       for (std::size_t i = 0; i < n; ++i) a.push_back({plain.x[i], plain.y[i], plain.z[i]});
       for (std::size_t i = 0; i < n; ++i) b.push_back({tiled.x[i], tiled.y[i], tiled.z[i]});

@@ -14,6 +14,11 @@ const formats = {
 };
 const methods = ['get', 'put', 'post', 'delete', 'options', 'head', 'patch', 'trace'];
 
+/** What any answer may carry, whatever it is an answer to; every other header must be stated. */
+const commonHeaders = new Set(['allow', 'cache-control', 'connection', 'content-length', 'content-security-policy', 'content-type',
+  'cross-origin-opener-policy', 'cross-origin-resource-policy', 'date', 'keep-alive', 'permissions-policy', 'referrer-policy', 'retry-after',
+  'strict-transport-security', 'transfer-encoding', 'vary', 'www-authenticate', 'x-content-type-options', 'x-frame-options', 'x-request-id']);
+
 /** What the request gate may answer to anything before it looks at the path. */
 const gateStatuses = [400, 403, 408, 413, 414, 421, 431, 503];
 
@@ -76,6 +81,18 @@ export class Contract {
     this.validate(schema, problem, what);
   }
 
+  /** Each header is one that all answers may have, or stated for this one and of its schema; those that are required are there. */
+  checkHeaders(answer, response, what, method) {
+    const stated = Object.fromEntries(Object.entries(answer.headers ?? {}).map(([name, header]) => [name.toLowerCase(), this.resolve(header)]));
+    for (const [name, header] of Object.entries(stated)) {
+      if (response.headers[name] !== undefined) this.validate(header.schema, response.headers[name], `${what}: the header ${name}`);
+      else assert.ok(!header.required || method === 'HEAD', `${what}: the header ${name} is missing`);
+    }
+    for (const name of Object.keys(response.headers)) {
+      assert.ok(commonHeaders.has(name) || stated[name], `${what}: a header that openapi.json does not state: ${name}: ${response.headers[name]}`);
+    }
+  }
+
   /** `gate`: the request is made to be refused before its path is looked at. */
   check(method, path, response, { gate = false } = {}) {
     const what = `${method} ${path} -> ${response.status} ${mediaType(response.headers)}`;
@@ -98,14 +115,16 @@ export class Contract {
     }
     const answer = this.resolve(operation.responses[response.status] ?? operation.responses[`${Math.trunc(response.status / 100)}XX`]);
     assert.ok(answer, `${what}: a status that openapi.json does not state for ${template}`);
-    if (method === 'HEAD' || response.status === 304 || response.body.length === 0) {
-      if (response.status === 204) assert.equal(response.body.length, 0, what);
+    this.checkHeaders(answer, response, what, method);
+    if (method === 'HEAD' || response.status === 304 || !answer.content) {
+      assert.equal(response.body.length, 0, `${what}: a body that openapi.json does not state`);
       return;
     }
-    const content = answer.content?.[mediaType(response.headers)];
+    const content = answer.content[mediaType(response.headers)];
     assert.ok(content, `${what}: a media type that openapi.json does not state for ${template}`);
-    if (response.json !== undefined) {
+    if (/[/+]json$/.test(mediaType(response.headers))) {
       assert.ok(content.schema, `${what}: openapi.json has no schema`);
+      assert.notEqual(response.json, undefined, `${what}: no body`);
       this.validate(content.schema, response.json, what);
     } else if (mediaType(response.headers) === 'application/x-ndjson' && content.schema && this.resolve(content.schema).type !== 'string') {
       response.text.split('\n').filter(Boolean).forEach((line, index) => this.validate(content.schema, JSON.parse(line), `${what} line ${index + 1}`));

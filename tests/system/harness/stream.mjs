@@ -1,4 +1,5 @@
 // stream: a reader of server-sent events that keeps what it saw and can be told to stop reading.
+import assert from 'node:assert/strict';
 import http from 'node:http';
 import { cleanup } from './cleanup.mjs';
 import { within } from './wait.mjs';
@@ -14,6 +15,9 @@ export class Stream {
     this.pending = { event: 'message', data: [] };
     this.tail = '';
     this.watchers = new Set();
+    this.contract = undefined;  // set: the first events of each kind are held against their schema (all of them would make a slow reader)
+    this.checked = {};
+    this.fault = undefined;
     this.opened = new Promise((done, fail) => {
       this.request = http.request({ port, host: '127.0.0.1', path, agent: false, headers: { Accept: 'text/event-stream', ...headers } }, (response) => {
         this.response = response;
@@ -51,7 +55,7 @@ export class Stream {
     if (line === '') {
       // As in the standard: a message without data is not shown, but its id counts.
       if (this.pending.id !== undefined) this.lastEventId = this.pending.id;
-      if (this.pending.data.length > 0) this.events.push({ ...this.pending, data: this.pending.data.join('\n') });
+      if (this.pending.data.length > 0) this.keep({ ...this.pending, data: this.pending.data.join('\n') });
       this.pending = { event: 'message', data: [] };
       return;
     }
@@ -69,6 +73,20 @@ export class Stream {
     else throw new Error(`not a line of an event stream: ${line}`);
   }
 
+  keep(message) {
+    this.events.push(message);
+    if (!this.contract || message.id === undefined || this.checked[message.event] >= 20) return;
+    this.checked[message.event] = (this.checked[message.event] ?? 0) + 1;
+    try {
+      const event = JSON.parse(message.data);
+      this.contract.validate({ $ref: '#/components/schemas/Event' }, event, `the message ${message.id}`);
+      assert.deepEqual([String(event.seq), event.kind], [message.id, message.event], 'a message and its event');
+    } catch (error) {
+      this.fault ??= error;
+      this.close();
+    }
+  }
+
   tell() { for (const watcher of [...this.watchers]) watcher(); }
 
   /** Waits until `probe(this)` is true; fails if the stream closes first (unless that is what makes it true). */
@@ -76,7 +94,8 @@ export class Stream {
     let watcher;
     const reached = new Promise((done, fail) => {
       watcher = () => {
-        if (probe(this)) done(this);
+        if (this.fault) fail(this.fault);
+        else if (probe(this)) done(this);
         else if (this.closed) fail(new Error(`the stream closed before ${what}; last: ${JSON.stringify(this.events.slice(-2))}`));
       };
       this.watchers.add(watcher);
@@ -97,6 +116,10 @@ export class Stream {
 /** Opens a stream for a test; it is closed at the test's end. */
 export async function openStream(t, server, path, options) {
   const stream = new Stream(server.port, path, options);
-  cleanup(t, () => stream.close());
+  if (/\/events(\?|$)/.test(path)) stream.contract = server.contract;
+  cleanup(t, () => {
+    stream.close();
+    if (stream.fault) throw stream.fault;
+  });
   return within(60_000, stream.opened, `the stream ${path} to open`);
 }
