@@ -71,7 +71,7 @@ std::vector<QueryParam> analysis_params() {
   constexpr double kObjectAreaMax_px = kImageSideMax_px * kImageSideMax_px;
   return {{"name", QueryType::kText, 0, 0, {}, "a name for people"},
           {"um_per_px", QueryType::kNumber, kImageScaleMin_um_per_px, kImageScaleMax_um_per_px, {},
-         "size of a pixel; without it lengths are in pixels"},
+           "size of a pixel; without it lengths are in pixels"},
           {"foreground", QueryType::kName, 0, 0, {"auto", "light", "dark"}, "what the objects are; default auto"},
           {"channel", QueryType::kInteger, 0, 15, {}, "from 0; an image of several channels needs one"},
           {"threshold", QueryType::kInteger, 0, 254, {}, "of the step `signal`; default by Otsu"},
@@ -81,7 +81,7 @@ std::vector<QueryParam> analysis_params() {
           {"area_min_px", QueryType::kInteger, 1, kObjectAreaMax_px, {}, "the smallest object; default by the picture"},
           {"hole_max_px", QueryType::kInteger, 0, kObjectAreaMax_px, {}, "the largest hole that is filled; default by the picture"},
           {"background_reach_px", QueryType::kInteger, 3, kImageSideMax_px, {},
-         "nuclei: wider than any object; default a quarter of the shorter side"},
+           "nuclei: wider than any object; default a quarter of the shorter side"},
           {"window_radius_px", QueryType::kInteger, 1, 50, {}, "phase: of the local deviation; default 3"}};
 }
 
