@@ -91,11 +91,11 @@ Json encode_progress(const Progress& progress) {
           {"eta_s", maybe(progress.eta_s)}};
 }
 
-Json encode_job(const JobView& view) {
+Json encode_job(const JobView& view, std::string_view base_path) {
   const JobRow& job = view.job;
   Json labels = Json::object();
   for (const auto& [key, value] : job.labels) labels[key] = value;
-  const std::string self = "/v1/jobs/" + job.id;
+  const std::string self = std::string(base_path) + "/v1/jobs/" + job.id;
   return {{"id", job.id},
           {"kind", job.kind},
           {"name", job.name},

@@ -3,6 +3,7 @@
 
 #include "server/api/codec_analysis.hpp"
 #include "server/api/codec_event.hpp"
+#include "server/api/codec_patch.hpp"
 #include "server/api/codec_report.hpp"
 #include "server/api/problems.hpp"
 #include "server/api/schema.hpp"
@@ -228,6 +229,7 @@ Json component_schemas(const SpecLimits& limits) {
       {"JobSpec", std::move(job_spec)},
       {"Spec", spec_schema(limits)},
       {"Job", job_schema()},
+      {"JobPatch", job_patch_schema()},
       {"Submission", submission_schema()},
       {"JobList", page_of("Job", nullable("string"))},
       {"JobCounts", counts_schema()},

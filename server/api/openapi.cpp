@@ -4,13 +4,15 @@
 #include <cmath>
 #include <map>
 
+#include "server/api/openapi_headers.hpp"
 #include "server/api/schema.hpp"
 
 namespace colony::server::api {
 namespace {
 
-Json problem_answer(std::string_view description) {
+Json problem_answer(const Endpoint& endpoint, int status, std::string_view description) {
   return {{"description", description},
+          {"headers", problem_headers(endpoint, status)},
           {"content", {{"application/problem+json", {{"schema", reference("Problem")}}}}}};
 }
 
@@ -57,17 +59,7 @@ Json parameters_of(const Endpoint& endpoint) {
     }
     parameters.push_back(std::move(one));
   }
-  const auto header = [&](const char* name, const char* text, Json schema) {
-    parameters.push_back({{"name", name}, {"in", "header"}, {"description", text}, {"schema", std::move(schema)}});
-  };
-  if (endpoint.operation_id == "submitJob") {
-    header("Idempotency-Key", "the same key and body give the same job",
-           {{"type", "string"}, {"minLength", 1}, {"maxLength", kIdempotencyKeyBytesMax}, {"pattern", "^[ -~]+$"}});
-  }
-  if (endpoint.operation_id == "listEvents") {
-    header("Last-Event-ID", "text/event-stream: the last seq seen; of this and `after` the greater wins",
-           {{"type", "string"}, {"pattern", "^[0-9]+$"}});
-  }
+  add_header_parameters(endpoint, parameters);
   return parameters;
 }
 
@@ -93,16 +85,7 @@ Json success_answer(const Endpoint& endpoint, int status, std::string_view descr
       answer["content"][std::string(media)] = {{"schema", media_schema(endpoint, media)}};
     }
   }
-  const auto header = [&](const char* name, const char* text) {
-    answer["headers"][name] = {{"description", text}, {"schema", {{"type", "string"}}}};
-  };
-  if (endpoint.operation_id == "submitJob") header("Location", "path of the job");
-  if (status == 201 || status == 202) {
-    if (endpoint.operation_id == "analyseImage" || endpoint.operation_id == "compare") {
-      header("Location", "path of what was made");
-    }
-  }
-  if (endpoint.operation_id == "listJobs") header("Link", "rel=next, if there is a next page");
+  answer["headers"] = answer_headers(endpoint, status);
   return answer;
 }
 
@@ -138,14 +121,21 @@ Json responses_of(const Endpoint& endpoint) {
   for (const auto& [status, description] : endpoint.answers) {
     responses[std::to_string(status)] = success_answer(endpoint, status, description);
   }
-  for (const auto& [status, text] : problems) responses[std::to_string(status)] = problem_answer(text);
-  responses["default"] = problem_answer("any other problem");
+  if (endpoint.validator != Validator::kNone) {
+    problems[412] = problem_row(ProblemKind::kPreconditionFailed).title;
+    responses["304"] = {{"description", "the answer is as If-None-Match supposes"}, {"headers", answer_headers(endpoint, 304)}};
+  }
+  for (const auto& [status, text] : problems) responses[std::to_string(status)] = problem_answer(endpoint, status, text);
+  responses["default"] = problem_answer(endpoint, 0, "any other problem");
   return responses;
 }
 
 Json request_body_of(const Endpoint& endpoint) {
   if (endpoint.operation_id == "submitJob") {
     return {{"required", true}, {"content", {{"application/json", {{"schema", reference("JobSpec")}}}}}};
+  }
+  if (endpoint.operation_id == "editJob") {
+    return {{"required", true}, {"content", {{"application/merge-patch+json", {{"schema", reference("JobPatch")}}}}}};
   }
   if (endpoint.operation_id == "compare") {
     return {{"required", true}, {"content", {{"application/json", {{"schema", reference("ComparisonSpec")}}}}}};
@@ -171,8 +161,9 @@ Json openapi_document(std::span<const Endpoint> table, const SpecLimits& limits,
     std::transform(method.begin(), method.end(), method.begin(),
                    [](char c) { return static_cast<char>(c - 'A' + 'a'); });
     Json operation = {
-        {"operationId", endpoint.operation_id}, {"summary", endpoint.summary}, {"parameters", parameters_of(endpoint)}};
-    if (endpoint.method == "POST") operation["requestBody"] = request_body_of(endpoint);
+        {"operationId", endpoint.operation_id}, {"tags", Json::array({tag_of(endpoint)})},
+        {"summary", endpoint.summary}, {"parameters", parameters_of(endpoint)}};
+    if (endpoint.method == "POST" || endpoint.method == "PATCH") operation["requestBody"] = request_body_of(endpoint);
     operation["responses"] = responses_of(endpoint);
     paths[std::string(endpoint.path)][method] = std::move(operation);
   }
@@ -186,6 +177,7 @@ Json openapi_document(std::span<const Endpoint> table, const SpecLimits& limits,
              "documents (RFC 9457) that name every wrong field at once."}}},
           {"jsonSchemaDialect", "https://json-schema.org/draft/2020-12/schema"},
           {"servers", Json::array({{{"url", base_path.empty() ? "/" : base_path}}})},
+          {"tags", tag_list()},
           {"paths", std::move(paths)},
           {"components",
            {{"parameters",

@@ -28,7 +28,8 @@ enum class ProblemKind {
   kUnavailable,
   kInternal,
   kUnsupportedMediaType,
-  kNotAcceptable
+  kNotAcceptable,
+  kPreconditionFailed
 };
 
 /// Of one document; a list of 100,000 wrong positions needs no 100,000 lines of answer. The detail says how many there

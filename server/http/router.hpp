@@ -24,6 +24,8 @@ class Router {
   /// Heavy handlers (seconds of computing) run on at most half of the worker threads.
   enum class Weight { kLight, kHeavy };
   void add(std::string method, std::string pattern, Handler handler, Weight weight = Weight::kLight);
+  /// A header of the answers to OPTIONS for this pattern, e.g. Accept-Patch.
+  void advertise(std::string_view pattern, std::string name, std::string value);
   bool is_heavy(const Request& request) const;
   /// Who hears what a handler or a stream threw (any thread); the client gets the request id only.
   void on_failure(std::function<void(const Request&, std::string_view what)> log) { failure_log_ = std::move(log); }
@@ -36,7 +38,9 @@ class Router {
   struct Route { std::string method; std::vector<std::string> segments; Handler handler; Weight weight; };
   const std::vector<std::string>* pattern_of(const std::vector<std::string>& path) const;   // nullptr: none fits
   const Route* route_of(const std::vector<std::string>& pattern, std::string_view method) const;   // GET answers HEAD
+  struct Advert { std::vector<std::string> segments; std::string name, value; };
   std::vector<Route> routes_;
+  std::vector<Advert> adverts_;
   std::function<void(const Request&, std::string_view)> failure_log_;
 };
 

@@ -122,10 +122,10 @@ void LocalJobService::run_loop() {
       continue;
     }
     const auto& [job, live] = *taken;
-    hub_->announce(job.job_key);
+    hub_->announce({job.job_key, JobNews::Kind::kChange});
     leave(job, live, run_job(environment_, job, live));
     changed_.notify_all();
-    hub_->announce(job.job_key);
+    hub_->announce({job.job_key, JobNews::Kind::kChange});
   }
 }
 
@@ -185,7 +185,7 @@ void LocalJobService::retry_loop() {
     if (back) ++nudges_;
     lock.unlock();
     changed_.notify_all();
-    hub_->announce(job_key);
+    hub_->announce({job_key, JobNews::Kind::kChange});
     lock.lock();
   }
 }

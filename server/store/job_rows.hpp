@@ -32,6 +32,9 @@ std::int64_t insert_job_row(Connection& connection, const NewJob& job);
 /// Writes back everything that can change: state, reason, detail, command, wall times, revision, last_seq, digest, counts, time.
 void update_job_row(Connection& connection, const JobRow& job);
 
+/// Name, labels and revision.
+void update_job_text_row(Connection& connection, const JobRow& job);
+
 struct UsedKey {
   std::int64_t job_key = 0;
   std::string body_hash;
