@@ -12,6 +12,12 @@ namespace {
 
 using Labels = std::map<std::string, std::string>;
 
+JobTextChange named(const char* name) {
+  JobTextChange change;
+  change.name = name;
+  return change;
+}
+
 class StoreEditTest : public testing::Test {
  protected:
   void SetUp() override { open(); }
@@ -103,7 +109,7 @@ TEST_F(StoreEditTest, AnotherRevisionOrTooManyLabelsChangeNothing) {
   EXPECT_EQ(error.error().fields.at(0).pointer, "/labels");
   EXPECT_EQ(store_->find_job(job.job_key)->name, "before");
   EXPECT_EQ(store_->find_job(job.job_key)->revision, job.revision);
-  EXPECT_TRUE(update(job.job_key, {.name = "after"}, std::vector<std::uint64_t>{5, job.revision}).changed);
+  EXPECT_TRUE(update(job.job_key, named("after"), std::vector<std::uint64_t>{5, job.revision}).changed);
   EXPECT_EQ(store_->update_job_text(77, change, std::nullopt, "alice").error().code, ErrorCode::kNotFound);
 }
 
@@ -128,14 +134,14 @@ TEST_F(StoreEditTest, OfManyWithOneRevisionOneWins) {
 TEST_F(StoreEditTest, StaysWhileTheJobGrowsAndAfterItEnded) {
   const JobRow job = create();
   ASSERT_TRUE(store_->take_queued_job());
-  update(job.job_key, {.name = "while running"});
+  update(job.job_key, named("while running"));
   store_->append_events(tests::sample_batch(job.job_key, 1, 3), [](const Status& status) { EXPECT_TRUE(status); });
   ASSERT_TRUE(store_->flush());
   EXPECT_EQ(store_->find_job(job.job_key)->name, "while running");
   ASSERT_TRUE(store_->command_job(job.job_key, JobCommand::kCancel));
   JobRow now = *store_->find_job(job.job_key);
   EXPECT_EQ(now.command, "cancel");
-  EXPECT_EQ(update(job.job_key, {.name = "again"}).job.command, "cancel") << "the wish stands";
+  EXPECT_EQ(update(job.job_key, named("again")).job.command, "cancel") << "the wish stands";
   now = *store_->find_job(job.job_key);
   EXPECT_EQ(now.last_seq, 3u);
   EXPECT_EQ(now.command, "cancel");

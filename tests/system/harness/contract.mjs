@@ -14,6 +14,9 @@ const formats = {
 };
 const methods = ['get', 'put', 'post', 'delete', 'options', 'head', 'patch', 'trace'];
 
+/** Fields of an answer that a client acts upon. */
+const meaningful = ['etag', 'link', 'location', 'retry-after', 'preference-applied', 'accept-post', 'accept-patch', 'vary'];
+
 /** What the request gate may answer to anything before it looks at the path. */
 const gateStatuses = [400, 403, 408, 413, 414, 421, 431, 503];
 
@@ -76,6 +79,19 @@ export class Contract {
     this.validate(schema, problem, what);
   }
 
+  /** What the document requires is there and as it says, and nothing that means something is left unsaid. */
+  checkHeaders(answer, response, what) {
+    const stated = new Map(Object.entries(answer.headers ?? {}).map(([name, header]) => [name.toLowerCase(), this.resolve(header)]));
+    for (const [name, header] of stated) {
+      const value = response.headers[name];
+      if (value === undefined) assert.ok(!header.required, `${what}: the header lacks ${name}`);
+      else this.validate(header.schema, value, `${what}: header ${name}`);
+    }
+    for (const name of meaningful.filter((candidate) => candidate in response.headers)) {
+      assert.ok(stated.has(name), `${what}: openapi.json does not state the header ${name}: ${response.headers[name]}`);
+    }
+  }
+
   /** `gate`: the request is made to be refused before its path is looked at. */
   check(method, path, response, { gate = false } = {}) {
     const what = `${method} ${path} -> ${response.status} ${mediaType(response.headers)}`;
@@ -98,6 +114,7 @@ export class Contract {
     }
     const answer = this.resolve(operation.responses[response.status] ?? operation.responses[`${Math.trunc(response.status / 100)}XX`]);
     assert.ok(answer, `${what}: a status that openapi.json does not state for ${template}`);
+    this.checkHeaders(answer, response, what);
     if (method === 'HEAD' || response.status === 304 || response.body.length === 0) {
       if (response.status === 204) assert.equal(response.body.length, 0, what);
       return;
