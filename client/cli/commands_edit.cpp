@@ -61,8 +61,8 @@ ExitCode edit_job(Session& session, const EditOptions& options) {
   const Json job = body_json(response);
   session.env.out << member_text(job, "id") << ": revision " << member_text(job, "revision") << ", name "
                   << member_text(job, "name");
-  for (const auto& [key, value] : job.value("labels", Json::object()).items())
-    session.env.out << ", " << printable(key) << "=" << cell_text(value);
+  const Json labels = job.value("labels", Json::object());
+  for (const auto& [key, value] : labels.items()) session.env.out << ", " << printable(key) << "=" << cell_text(value);
   session.env.out << '\n';
   return ExitCode::kDone;
 }
