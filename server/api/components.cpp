@@ -222,6 +222,11 @@ Json component_schemas(const SpecLimits& limits) {
   Json job_spec = job_spec_schema(limits);
   job_spec.erase("$schema");
   job_spec.erase("$id");
+  job_spec["examples"] = Json::array({{{"name", "AHH-1 at 37 C"},
+                                       {"labels", {{"plate", "7"}}},
+                                       {"seed", 1},
+                                       {"until", {{"time_h", 240}, {"cells", 2000}}},
+                                       {"model", {{"cycle", {{"mean_h", 12}, {"sd_h", 2}}}}}}});
   Json activity = names_upto(Activity::kSenescent);
   Json cell = row_schema(cell_columns());
   cell["properties"]["activity"] = std::move(activity);

@@ -1,7 +1,6 @@
 #include "server/api/docs.hpp"
 
 #include <algorithm>
-#include <cctype>
 #include <vector>
 
 namespace colony::server::api {
@@ -22,6 +21,21 @@ std::string escaped(std::string_view text) {
     }
   }
   return out;
+}
+
+/// A text for people: escaped, and what stands in backticks as code.
+std::string prose(std::string_view text) {
+  std::string out;
+  bool is_code = false;
+  for (const char c : escaped(text)) {
+    if (c != '`') {
+      out += c;
+    } else {
+      out += is_code ? "</code>" : "<code>";
+      is_code = !is_code;
+    }
+  }
+  return is_code ? escaped(text) : out;  // an odd one out is no markup
 }
 
 std::string text_of(const Json& node, const char* name) {
@@ -101,7 +115,7 @@ class Page {
 
   void operation(const std::string& path, const std::string& method, const Json& operation) {
     out_ += "<article id=\"" + escaped(text_of(operation, "operationId")) + "\">\n<h3><b>" + method + "</b> " + escaped(path) +
-            "</h3>\n<p>" + escaped(text_of(operation, "summary")) + "</p>\n";
+            "</h3>\n<p>" + prose(text_of(operation, "summary")) + "</p>\n";
     parameters(operation["parameters"]);
     if (const auto body = operation.find("requestBody"); body != operation.end()) {
       out_ += "<h4>Body</h4>\n<ul>\n";
@@ -125,7 +139,7 @@ class Page {
     for (const Json& one : list) {
       const Json& parameter = resolved(one);
       out_ += "<tr><td>" + code(text_of(parameter, "name")) + "</td><td>" + escaped(text_of(parameter, "in")) + "</td><td>" +
-              type_text(parameter["schema"]) + "</td><td>" + escaped(text_of(parameter, "description")) + "</td></tr>\n";
+              type_text(parameter["schema"]) + "</td><td>" + prose(text_of(parameter, "description")) + "</td></tr>\n";
     }
     out_ += "</tbody>\n</table>\n";
   }
@@ -146,9 +160,9 @@ class Page {
         content += code(media) + " " + type_text(member(value, "schema")) + "<br>";
       }
       for (const auto& [name, value] : member(answer, "headers").items()) {
-        if (name != "X-Request-Id") fields += "<b>" + escaped(name) + "</b>: " + escaped(text_of(value, "description")) + "<br>";
+        if (name != "X-Request-Id") fields += "<b>" + escaped(name) + "</b>: " + prose(text_of(value, "description")) + "<br>";
       }
-      out_ += "<tr><td>" + escaped(status) + "</td><td>" + escaped(text) + "</td><td>" + content + "</td><td>" + fields + "</td></tr>\n";
+      out_ += "<tr><td>" + escaped(status) + "</td><td>" + prose(text) + "</td><td>" + content + "</td><td>" + fields + "</td></tr>\n";
     }
     out_ += "</tbody>\n</table>\n<details><summary>Problems</summary>\n<p>Each is a <a href=\"#schema-Problem\">Problem</a>.</p>\n<table>\n<tbody>\n" +
             usual + "</tbody>\n</table>\n</details>\n";
@@ -248,7 +262,7 @@ class Page {
   }
 
   void members(const Json& schema, int depth) {
-    if (const std::string text = text_of(schema, "description"); !text.empty() && depth == 0) out_ += "<p>" + escaped(text) + "</p>\n";
+    if (const std::string text = text_of(schema, "description"); !text.empty() && depth == 0) out_ += "<p>" + prose(text) + "</p>\n";
     for (const char* choice : {"oneOf", "anyOf"}) {
       if (!schema.contains(choice)) continue;
       out_ += "<p>One of:</p>\n";
@@ -273,7 +287,7 @@ class Page {
       } else {
         out_ += type_text(value);
       }
-      out_ += "</td><td>" + escaped(text_of(value, "description")) + "</td></tr>\n";
+      out_ += "</td><td>" + prose(text_of(value, "description")) + "</td></tr>\n";
     }
     out_ += "</tbody>\n</table>\n";
   }

@@ -91,9 +91,10 @@ Json answer_headers(const Endpoint& endpoint, int status) {
   Json out = common_headers();
   const bool is_get = endpoint.method == "GET";
   if ((is_get && endpoint.validator != Validator::kNone && status != 204) || (!is_get && answers_a_job(endpoint))) {
-    const std::string_view text = endpoint.validator == Validator::kJob || answers_a_job(endpoint)
-                                      ? "\"<revision>.<last_seq>\" of the job"
-                                      : "names this answer; missing where the job went on while it was made";
+    std::string_view text = "`\"<revision>.<last_seq>\"` of the job";
+    if (endpoint.validator == Validator::kBody) text = "of the bytes of the answer";
+    if (endpoint.validator == Validator::kHistory)
+      text = "of the history, the query, the form and the program; missing where the job went on while the answer was made";
     out["ETag"] = header(text, pattern(kTagPattern), endpoint.validator == Validator::kJob);
   }
   if (endpoint.media.size() > 1) out["Vary"] = header("Accept: the answer depends on it", pattern("\\bAccept\\b"), true);
