@@ -166,8 +166,10 @@ std::vector<std::uint64_t> revisions_of(const TagList& list, bool also_weak) {
 
 std::string derived_tag(const Context& context, const Call& call, const Digest& digest, std::uint64_t seq,
                         std::string_view more) {
+  // Which resource of the job it is; not which job: the same history has the same tag wherever it was grown.
+  const std::string_view resource = std::string_view(call.request.path).substr(call.request.path.rfind('/') + 1);
   // No coding but identity is ever applied here; it is named so that one to come changes the tag.
-  return tag_of({digest.hex(), std::to_string(seq), call.query.normalised(), call.media, "identity",
+  return tag_of({resource, digest.hex(), std::to_string(seq), call.query.normalised(), call.media, "identity",
                  context.config.version, more});
 }
 
