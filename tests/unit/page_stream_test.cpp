@@ -22,6 +22,7 @@ using Pull = http::BodySource::Pull;
 /// Many jobs of one row's likeness; only what a page asks for.
 class ManyJobs : public FakeJobs {
  public:
+  using FakeJobs::show;
   std::map<std::int64_t, JobRow> rows;
   int shows = 0;
   int pages = 0;
@@ -75,8 +76,11 @@ class PageStreamTest : public ::testing::Test {
   /// "kind id" of every message until the stream waits.
   std::vector<std::string> drawn() {
     text_.clear();
-    while ((ended_ = stream_->pull(text_)) == Pull::kMore) {
-    }
+    do {
+      std::string piece;  // empty for each pull, as the session has it
+      ended_ = stream_->pull(piece);
+      text_ += piece;
+    } while (ended_ == Pull::kMore);
     std::vector<std::string> out;
     for (const std::string& message : split_lines(text_, "\n\n")) {
       const std::size_t data = message.find("\ndata: ");
