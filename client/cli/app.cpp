@@ -61,6 +61,7 @@ int run(const std::vector<std::string>& arguments, Environment& env) {
   add_fork_commands(app, session, action);
   add_watch_command(app, session, action);
   add_job_commands(app, session, action);
+  add_edit_command(app, session, action);
   add_data_commands(app, session, action);
   add_picture_commands(app, session, action);
   add_measure_commands(app, session, action);

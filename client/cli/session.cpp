@@ -64,6 +64,15 @@ HttpResponse Session::send_patiently(const HttpRequest& request) {
   }
 }
 
+std::string link_target(Session& session, const Json& row, const char* name) {
+  const std::string link = row.at("links").at(name).get<std::string>();
+  if (!link.starts_with('/') || link.starts_with("//")) throw Failure(ExitCode::kRefused, "the server gives a link that leads elsewhere: " + printable(link));
+  const std::string& server = session.client().server();
+  const std::size_t path = server.find('/', server.find("://") + 3);
+  const std::string base = path == std::string::npos ? "" : server.substr(path);
+  return !base.empty() && link.starts_with(base + "/") ? link.substr(base.size()) : link;
+}
+
 Target job_target(const std::string& id, const std::string& rest) { return Target("/v1/jobs/" + id + rest); }
 
 std::string resolve_job_id(Session& session, const std::string& text) {

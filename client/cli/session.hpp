@@ -33,6 +33,10 @@ struct Session {
 /// Errors: kUsage for what cannot be an id or is ambiguous (the candidates are named), kRefused when no job ends so.
 std::string resolve_job_id(Session& session, const std::string& text);
 
+/// A link of an answer as a target of this client: links begin with the server's base path, and so does --server.
+/// Failure kRefused if it leads elsewhere.
+std::string link_target(Session& session, const Json& row, const char* name);
+
 /// "/v1/jobs/<id>" plus `rest`.
 Target job_target(const std::string& id, const std::string& rest = {});
 

@@ -5,6 +5,7 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "engine/base/result.hpp"
 #include "server/api/json.hpp"
@@ -19,8 +20,8 @@ struct ComparisonSpec {
 };
 Result<ComparisonSpec> decode_comparison_spec(const Json& body);
 
-/// The member `result` is left out of lists.
-Json encode_analysis(const AnalysisRow& row, bool with_result);
+/// The member `result` is left out of lists. `base_path`: what the links begin with.
+Json encode_analysis(const AnalysisRow& row, bool with_result, std::string_view base_path);
 
 /// Schemas by component name.
 Json analysis_components();

@@ -3,6 +3,7 @@
 
 #include "server/api/codec_analysis.hpp"
 #include "server/api/codec_event.hpp"
+#include "server/api/codec_patch.hpp"
 #include "server/api/codec_report.hpp"
 #include "server/api/problems.hpp"
 #include "server/api/schema.hpp"
@@ -251,6 +252,11 @@ Json component_schemas(const SpecLimits& limits) {
   Json job_spec = job_spec_schema(limits);
   job_spec.erase("$schema");
   job_spec.erase("$id");
+  job_spec["examples"] = Json::array({{{"name", "AHH-1 at 37 C"},
+                                       {"labels", {{"plate", "7"}}},
+                                       {"seed", 1},
+                                       {"until", {{"time_h", 240}, {"cells", 2000}}},
+                                       {"model", {{"cycle", {{"mean_h", 12}, {"sd_h", 2}}}}}}});
   Json activity = names_upto(Activity::kSenescent);
   Json cell = row_schema(cell_columns());
   cell["properties"]["activity"] = std::move(activity);
@@ -262,6 +268,7 @@ Json component_schemas(const SpecLimits& limits) {
       {"VerifyResult", verify_result_schema()},
       {"Origin", origin_schema()},
       {"Job", job_schema()},
+      {"JobPatch", job_patch_schema()},
       {"Submission", submission_schema()},
       {"JobList", page_of("Job", nullable("string"))},
       {"JobCounts", counts_schema()},

@@ -117,6 +117,10 @@ std::optional<Response> Router::dispatch_ready(Request& request) const {
   }
 }
 
+void Router::advertise(std::string_view pattern, std::string name, std::string value) {
+  adverts_.push_back({split(pattern), std::move(name), std::move(value)});
+}
+
 void Router::report_failure(const Request& request, std::string_view what) const {
   if (failure_log_) failure_log_(request, what);
 }
@@ -166,6 +170,9 @@ Response Router::dispatch(Request& request) const {
     Response response;
     if (request.method == "OPTIONS") {
       response.status = 204;
+      for (const auto& advert : adverts_) {
+        if (advert.segments == *pattern) response.headers.set(advert.name, advert.value);
+      }
     } else {
       response = problem(405, "method-not-allowed", "The method is not allowed here",
                          request.path + " does not take " + request.method + ", but " + allow, request.request_id);

@@ -25,6 +25,8 @@ class Router {
   /// Heavy handlers (seconds of computing) run on at most half of the worker threads.
   enum class Weight { kLight, kHeavy };
   void add(std::string method, std::string pattern, Handler handler, Weight weight = Weight::kLight);
+  /// A header of the answers to OPTIONS for this pattern, e.g. Accept-Patch.
+  void advertise(std::string_view pattern, std::string name, std::string value);
   bool is_heavy(const Request& request) const;
   /// Of a route that is there: what can be answered from memory, on an I/O thread, without waiting for anything; nullopt: dispatch.
   using ReadyHandler = std::function<std::optional<Response>(const Request&)>;
@@ -42,8 +44,10 @@ class Router {
   struct Route { std::string method; std::vector<std::string> segments; Handler handler; Weight weight; };
   const std::vector<std::string>* pattern_of(const std::vector<std::string>& path) const;   // nullptr: none fits
   const Route* route_of(const std::vector<std::string>& pattern, std::string_view method) const;   // GET answers HEAD
+  struct Advert { std::vector<std::string> segments; std::string name, value; };
   std::vector<Route> routes_;
   std::vector<std::pair<std::size_t, ReadyHandler>> ready_;   // index of the route
+  std::vector<Advert> adverts_;
   std::function<void(const Request&, std::string_view)> failure_log_;
 };
 

@@ -242,6 +242,7 @@ Awaitable<void> Session::handle() {
   const bool is_queued = shared_.workers.submit_request(std::move(task), shared_.router.is_heavy(request_));
   if (is_queued) {
     co_await wait_for_worker();
+    if (response_.later) co_await wait_for_later();
   } else {
     refusal_ =
         Refusal{503, "overloaded", "The server is busy", "too many requests wait already; try again in a second"};

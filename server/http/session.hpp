@@ -74,6 +74,8 @@ class Session : public std::enable_shared_from_this<Session> {
   Awaitable<bool> send_piece(Framing framing, std::string_view shared, std::string_view own);
   Awaitable<void> wait_for_stream(std::string_view farewell, Connection::Clock::time_point until);
   Awaitable<void> wait_for_worker();
+  Awaitable<void> wait_for_later();  // session_later.cpp
+  void ask_later(bool is_first, bool is_last);
 
   std::optional<Refusal> admit();
   void give_back_large_body();
@@ -108,6 +110,7 @@ class Session : public std::enable_shared_from_this<Session> {
   bool worker_is_done_ = false;
   std::shared_ptr<Waker> waker_;
   bool woken_ = false;
+  std::unique_ptr<Response> late_;  // what a later answer gave
   std::string piece_;
   std::shared_ptr<const std::string> shared_piece_;  // goes before it
   std::optional<BodySource::Pull> pulled_;  // empty: the pull threw

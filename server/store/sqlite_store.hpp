@@ -33,6 +33,9 @@ class SqliteStore final : public Store {
   Result<JobRow> finish_job(const EventBatch& last, JobState state, const std::string& reason,
                             const std::string& detail) override;
   Result<Commanded> command_job(std::int64_t job_key, JobCommand command) override;
+  Result<TextUpdated> update_job_text(std::int64_t job_key, const JobTextChange& change,
+                                      const std::optional<std::vector<std::uint64_t>>& revisions,
+                                      const std::string& actor) override;
   Status delete_job(std::int64_t job_key) override;
   Result<std::vector<JobRow>> expire_jobs(const RetentionLimits& limits, std::int64_t now_ms) override;
   Result<std::vector<JobRow>> running_jobs() override;
@@ -41,6 +44,8 @@ class SqliteStore final : public Store {
   std::uint64_t commit_count() const override { return writer_->commit_count(); }
   Status flush() override;
   Result<std::vector<Event>> read_events(std::int64_t job_key, const EventFilter& filter, std::size_t limit) override;
+  Result<std::optional<std::uint64_t>> page_end(std::int64_t job_key, const EventFilter& filter,
+                                                std::size_t limit) override;
   Result<std::uint64_t> seq_at(std::int64_t job_key, double at_h) override;
   Result<std::vector<SeriesRow>> read_series(std::int64_t job_key) override;
 

@@ -112,6 +112,13 @@ class Store {
   /// forbids: kConflict. `pending`: the job runs on until its runner has carried out job.command; then ask again.
   struct Commanded { JobRow job; bool changed = true; bool pending = false; };
   virtual Result<Commanded> command_job(std::int64_t job_key, JobCommand command) = 0;
+  /// Name and labels, in any state. Decided in one transaction: if `revisions` is given and has not the job's, nothing changes and
+  /// is_current is false; what leaves all as it was changes nothing, not even the revision. More than labels_max labels: kInvalid
+  /// "/labels". Adds a log line.
+  struct TextUpdated { JobRow job; bool changed = true; bool is_current = true; };
+  virtual Result<TextUpdated> update_job_text(std::int64_t job_key, const JobTextChange& change,
+                                              const std::optional<std::vector<std::uint64_t>>& revisions,
+                                              const std::string& actor) = 0;
   /// Only terminal jobs (else kConflict); events, placements, series and log go with it.
   virtual Status delete_job(std::int64_t job_key) = 0;
   /// Marks as deleted what the limits let go at `now_ms` (since 1970): first by age, then, once nothing is being removed any more, by
@@ -132,6 +139,8 @@ class Store {
   virtual Status flush() = 0;
   /// Up to `limit` events by ascending seq. Complete: placement and woken rows joined.
   virtual Result<std::vector<Event>> read_events(std::int64_t job_key, const EventFilter& filter, std::size_t limit) = 0;
+  /// The seq of event number `limit` of those that read_events would give, if one more follows it; else nullopt. limit >= 1.
+  virtual Result<std::optional<std::uint64_t>> page_end(std::int64_t job_key, const EventFilter& filter, std::size_t limit) = 0;
   /// The last seq whose event has time_h <= at_h; 0 if none.
   virtual Result<std::uint64_t> seq_at(std::int64_t job_key, double at_h) = 0;
   /// The hourly rows, ascending.

@@ -80,6 +80,34 @@ Result<Store::Commanded> command_resume(Connection& connection, JobRow job, bool
   return Store::Commanded{std::move(job), true, false};
 }
 
+std::map<std::string, std::string> with_changes(std::map<std::string, std::string> labels, const JobTextChange& change) {
+  if (change.drops_labels) labels.clear();
+  for (const auto& [key, value] : change.labels) {
+    if (value) {
+      labels[key] = *value;
+    } else {
+      labels.erase(key);
+    }
+  }
+  return labels;
+}
+
+/// "renamed to ...; label plate = 8; label old removed", of what differs.
+std::string text_change_line(const JobRow& job, const std::string& name,
+                             const std::map<std::string, std::string>& labels) {
+  std::string line;
+  const auto say = [&line](const std::string& part) { line += (line.empty() ? "" : "; ") + part; };
+  if (name != job.name) say(name.empty() ? "name removed" : "renamed to \"" + name + "\"");
+  for (const auto& [key, value] : labels) {
+    const auto before = job.labels.find(key);
+    if (before == job.labels.end() || before->second != value) say("label " + key + " = \"" + value + "\"");
+  }
+  for (const auto& [key, value] : job.labels) {
+    if (!labels.contains(key)) say("label " + key + " removed");
+  }
+  return line;
+}
+
 }  // namespace
 
 Result<Store::Submitted> SqliteStore::create_job(const NewJob& job, std::size_t queued_max) {
@@ -224,6 +252,33 @@ Result<Store::Commanded> SqliteStore::command_job(std::int64_t job_key, JobComma
         return command_resume(connection, std::move(*job), true);
     }
     return Error{ErrorCode::kInternal, "unknown command"};
+  });
+}
+
+Result<Store::TextUpdated> SqliteStore::update_job_text(std::int64_t job_key, const JobTextChange& change,
+                                                        const std::optional<std::vector<std::uint64_t>>& revisions,
+                                                        const std::string& actor) {
+  return write<TextUpdated>([&](Connection& connection) -> Result<TextUpdated> {
+    std::optional<JobRow> job = find_job_row(connection, job_key);
+    if (!job) return no_job();
+    if (revisions && std::find(revisions->begin(), revisions->end(), job->revision) == revisions->end())
+      return TextUpdated{std::move(*job), false, false};
+    const std::string name = change.name.value_or(job->name);
+    std::map<std::string, std::string> labels = with_changes(job->labels, change);
+    if (labels.size() > change.labels_max) {
+      return Error{ErrorCode::kInvalid,
+                   "the job would have too many labels",
+                   {{"/labels", "would be " + std::to_string(labels.size()) + " labels; at most " +
+                                    std::to_string(change.labels_max) + " are allowed"}}};
+    }
+    if (name == job->name && labels == job->labels) return TextUpdated{std::move(*job), false, true};
+    const std::string line = text_change_line(*job, name, labels);
+    job->name = name;
+    job->labels = std::move(labels);
+    ++job->revision;
+    update_job_text_row(connection, *job);
+    insert_log_row(connection, job_key, "info", line, actor);
+    return TextUpdated{std::move(*job), true, true};
   });
 }
 

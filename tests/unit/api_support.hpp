@@ -59,6 +59,12 @@ class FakeJobs : public JobService {
   std::map<std::string, std::string> keys;  // idempotency key to body hash
   std::optional<Error> next_error;          // answered by the next command or submission
   std::function<void()> waker;
+  std::function<void(const JobNews&)> hearer;  // of the last follow()
+  std::optional<std::int64_t> followed_key;
+  int folds = 0;  // calls of colony_at and series, but for those of moment
+  JobTextChange asked_change;
+  std::optional<std::vector<std::uint64_t>> asked_revisions;
+  std::string asked_actor;
   std::optional<std::string> asked_cursor;
   JobFilter asked_filter;
   std::size_t asked_limit = 0;
@@ -108,8 +114,17 @@ class FakeJobs : public JobService {
   std::uint64_t commit_count() const override { return does_commit ? ++commits : commits.load(); }
   mutable std::atomic<std::uint64_t> commits{0};
   bool does_commit = true;
+  Result<JobView> show(std::int64_t job_key) override {
+    if (job_key != row.job_key) return missing(std::to_string(job_key));
+    return view();
+  }
+  std::optional<Progress> live_progress(std::int64_t job_key) override {
+    return job_key == row.job_key && row.state == JobState::kRunning ? std::optional(progress) : std::nullopt;
+  }
   Result<Page> list(const JobFilter& filter, std::size_t limit, const std::string& cursor) override {
     asked_filter = filter;
+    // What the stream of a page asks for.
+    if (filter.state && !filter.kind) return *filter.state == row.state ? Page{{view()}, std::nullopt} : Page{};
     asked_limit = limit;
     asked_cursor = cursor;
     if (cursor == "made-up")
@@ -136,12 +151,36 @@ class FakeJobs : public JobService {
     }
     return out;
   }
+  Result<Edited> edit(const std::string& id, const JobTextChange& change,
+                      const std::optional<std::vector<std::uint64_t>>& revisions, const std::string& actor) override {
+    if (id != row.id) return missing(id);
+    asked_change = change;
+    asked_revisions = revisions;
+    asked_actor = actor;
+    if (next_error) return *std::exchange(next_error, std::nullopt);
+    const bool fits = !revisions || std::find(revisions->begin(), revisions->end(), row.revision) != revisions->end();
+    if (fits) ++row.revision;
+    return Edited{view(), fits, fits};
+  }
+  Result<std::optional<std::uint64_t>> page_end(const std::string& id, const EventFilter& filter,
+                                                std::size_t limit) override {
+    const auto found = events(id, filter, limit + 1);
+    if (!found) return found.error();
+    return found->size() > limit ? std::optional((*found)[limit - 1].seq) : std::nullopt;
+  }
+  Result<Moment> moment(const std::string& id, std::optional<double> at_h) override {
+    const auto at = colony_at(id, at_h);  // dear here, but the same by its nature
+    --folds;
+    if (!at) return at.error();
+    return Moment{row, at->colony->last_seq(), at->digest};
+  }
   Result<std::vector<LogRow>> log(const std::string& id, std::int64_t after, std::size_t) override {
     if (id != row.id) return missing(id);
     if (after > 0) return std::vector<LogRow>{};
     return std::vector<LogRow>{{1, "2026-01-02T03:04:05.678Z", "info", "submitted", {}}};
   }
   Result<ColonyAt> colony_at(const std::string& id, std::optional<double> at_h) override {
+    ++folds;
     if (id != row.id) return missing(id);
     if (at_h && *at_h > 1e6) return Error{ErrorCode::kNotReached, "not there yet", {{"at_h", "beyond"}}};
     auto colony = std::make_shared<Colony>(spec.params);
@@ -152,9 +191,16 @@ class FakeJobs : public JobService {
   }
   Result<std::vector<SeriesRow>> series(const std::string& id, std::size_t points) override {
     if (id != row.id) return missing(id);
+    ++folds;
     std::vector<SeriesRow> rows(points);
     for (std::size_t i = 0; i < points; ++i) rows[i].time_h = 0.1 * static_cast<double>(i);
     return rows;
+  }
+  std::unique_ptr<Subscription> follow(std::optional<std::int64_t> job_key,
+                                       std::function<void(const JobNews&)> hear) override {
+    followed_key = job_key;
+    hearer = std::move(hear);
+    return std::make_unique<Subscription>();
   }
   std::unique_ptr<Subscription> subscribe(std::int64_t, std::function<void()> wake) override {
     waker = std::move(wake);

@@ -58,8 +58,10 @@ export class Server {
       this.child.on('error', fail);
       this.child.stdout.on('data', (bytes) => {
         this.out += bytes;
-        const match = /^listening on http:\/\/127\.0\.0\.1:(\d+)\n/m.exec(this.out);
-        if (match) done(Number(match[1]));
+        const match = /^listening on http:\/\/127\.0\.0\.1:(\d+)(\S*)\n/m.exec(this.out);
+        if (!match) return;
+        this.basePath = match[2];
+        done(Number(match[1]));
       });
       this.exited.then(({ code, signal }) => fail(new Error(`colonyd ended (${code ?? signal}) before it listened:\n${this.err}`)));
     });
@@ -76,7 +78,7 @@ export class Server {
       this.contract = contract;
       return this;
     }
-    const openapi = await send(this.port, 'GET', '/openapi.json');
+    const openapi = await send(this.port, 'GET', `${this.basePath}/openapi.json`);
     assert.equal(openapi.status, 200);
     this.contract = new Contract(openapi.json);
     return this;
