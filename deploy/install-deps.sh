@@ -14,6 +14,7 @@ packages=(
   libtiff-dev zlib1g-dev libturbojpeg0-dev libopencv-core-dev libopencv-imgproc-dev   # engine/analysis: real images; engine/picture: OME-TIFF
   libsqlite3-dev sqlite3                                     # server/store; the shell reads the database in the tests
   libspdlog-dev libtomlplusplus-dev                          # server
+  libssl-dev                # server/http: TLS, and tokens' randomness and hashes
   libtinygltf-dev                                            # server/api: meshes as GLB
   libcli11-dev libcurl4-openssl-dev                          # client
   libgtest-dev libgmock-dev librapidcheck-dev libbenchmark-dev   # tests

@@ -42,9 +42,13 @@ http::Response run_endpoint(const Endpoint& endpoint, Context& context, const ht
   }
 }
 
-Api::Api(JobService& jobs, ApiConfig config) {
+http::Access access_of(const Endpoint& endpoint) {
+  return endpoint.access.value_or(endpoint.method == "GET" ? http::Access::kRead : http::Access::kSubmit);
+}
+
+Api::Api(JobService& jobs, http::TokenTable& tokens, ApiConfig config) {
   const SpecLimits limits{config.jobs.cells_max};
-  context_ = std::unique_ptr<Context>(new Context{jobs, std::move(config), false, {}, {}});
+  context_ = std::unique_ptr<Context>(new Context{jobs, tokens, std::move(config), false, {}, {}});
   context_->schema_text = to_text(job_spec_schema(limits));
   context_->openapi_text =
       to_text(openapi_document(endpoints(), limits, context_->config.version, context_->config.base_path));
@@ -74,7 +78,7 @@ void Api::add_routes(http::Router& router) {
                [&endpoint, context = context_.get()](const http::Request& request) {
                  return run_endpoint(endpoint, *context, request);
                },
-               endpoint.is_heavy ? http::Router::Weight::kHeavy : http::Router::Weight::kLight);
+               endpoint.is_heavy ? http::Router::Weight::kHeavy : http::Router::Weight::kLight, access_of(endpoint));
   }
 }
 

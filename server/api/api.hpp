@@ -8,6 +8,8 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <mutex>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -17,6 +19,7 @@
 #include "server/api/problems.hpp"
 #include "server/api/query.hpp"
 #include "server/http/router.hpp"
+#include "server/http/tokens.hpp"
 #include "server/jobs/analysis_worker.hpp"
 #include "server/jobs/service.hpp"
 
@@ -55,12 +58,14 @@ inline constexpr std::uint64_t kFoundersPlacedFreely = 1000;
 /// What handlers work with.
 struct Context {
   JobService& jobs;
+  http::TokenTable& tokens;
   const ApiConfig config;
   std::atomic<bool> draining{false};  // asks long computations to give up, too
   std::string schema_text;            // made once
   std::string openapi_text;
   std::atomic<bool> places_many{false};  // a submission of many founders is being checked
   std::unique_ptr<AnalysisWorker> worker = {};  // from start() on
+  std::mutex tokens_mutex = {};  // a change of the stored tokens and of `tokens` is one
 };
 
 /// A request that has passed the table's checks.
@@ -89,13 +94,18 @@ struct Endpoint {
   /// What a POST takes; empty: application/json. None of them can be sent by a page of another site without asking first: only text/plain and
   /// the two form types can (CORS safelist), so exactly these are demanded.
   std::vector<std::string_view> body_media = {};
+  /// What it needs where tokens are required; nullopt: read for GET, submit for all else. So only the exceptions are written down.
+  std::optional<http::Access> access = std::nullopt;
 };
+
+http::Access access_of(const Endpoint& endpoint);
 
 std::span<const Endpoint> endpoints();
 
 class Api {
  public:
-  Api(JobService& jobs, ApiConfig config);
+  /// `tokens`: the table that admission asks; kept the same as the stored ones. Both outlive it.
+  Api(JobService& jobs, http::TokenTable& tokens, ApiConfig config);
   ~Api();
   /// Takes up analyses that are queued. Before it, and without it, they wait.
   Status start();
@@ -145,6 +155,9 @@ http::Response get_comparison_figure(Context& context, const Call& call);
 http::Response get_job_schema(Context& context, const Call& call);
 http::Response get_openapi(Context& context, const Call& call);
 http::Response get_service_info(Context& context, const Call& call);
+http::Response post_token(Context& context, const Call& call);
+http::Response get_tokens(Context& context, const Call& call);
+http::Response delete_token(Context& context, const Call& call);
 http::Response get_healthz(Context& context, const Call& call);
 http::Response get_readyz(Context& context, const Call& call);
 

@@ -128,7 +128,8 @@ Json encode_job(const JobView& view) {
 }
 
 Json encode_log_row(const LogRow& row) {
-  return {{"index", row.index}, {"at", row.at}, {"level", row.level}, {"message", row.message}};
+  return {{"index", row.index}, {"at", row.at}, {"level", row.level}, {"message", row.message},
+          {"actor", row.actor.empty() ? Json(nullptr) : Json(row.actor)}};
 }
 
 }  // namespace colony::server::api

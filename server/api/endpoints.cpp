@@ -1,6 +1,7 @@
 // The table of operations.
 #include "engine/picture/mesh.hpp"
 #include "server/api/api.hpp"
+#include "server/api/endpoints_service.hpp"
 #include "server/api/measure.hpp"
 
 namespace colony::server::api {
@@ -335,54 +336,17 @@ std::vector<Endpoint> make_endpoints() {
        {kMalformed, kNotFound, kTimeNotReached, kLimit},
        get_comparison_figure,
        true},
-      {"GET",
-       "/v1/schema/job",
-       "getJobSchema",
-       "JSON Schema (2020-12) of a job spec",
-       {kJson, "application/schema+json"},
-       {},
-       {{200, "the schema"}},
-       "",
-       {},
-       get_job_schema},
-      {"GET",
-       "/openapi.json",
-       "getOpenapi",
-       "This description",
-       {kJson},
-       {},
-       {{200, "the description"}},
-       "",
-       {},
-       get_openapi},
-      {"GET",
-       "/v1/service-info",
-       "getServiceInfo",
-       "Version, limits, presets and parameters",
-       {kJson},
-       {},
-       {{200, "facts"}},
-       "ServiceInfo",
-       {},
-       get_service_info},
-      {"GET", "/healthz", "getHealth", "Alive", {kJson}, {}, {{200, "alive"}}, "Health", {}, get_healthz},
-      {"GET",
-       "/readyz",
-       "getReadiness",
-       "Ready: database writable, disk free, not draining",
-       {kJson},
-       {},
-       {{200, "ready"}},
-       "Health",
-       {},
-       get_readyz},
   };
 }
 
 }  // namespace
 
 std::span<const Endpoint> endpoints() {
-  static const std::vector<Endpoint> table = make_endpoints();
+  static const std::vector<Endpoint> table = [] {
+    std::vector<Endpoint> all = make_endpoints();
+    for (Endpoint& endpoint : service_endpoints()) all.push_back(std::move(endpoint));
+    return all;
+  }();
   return table;
 }
 

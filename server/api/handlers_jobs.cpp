@@ -90,10 +90,10 @@ class ManyFounders {
 };
 
 http::Response command(Context& context, const Call& call,
-                       Result<JobService::Commanded> (JobService::*method)(const std::string&)) {
+                       Result<JobService::Commanded> (JobService::*method)(const std::string&, const std::string&)) {
   if (const Status arguments = check_no_arguments(call.request.body); !arguments)
     return failure(arguments.error(), call);
-  const auto done = (context.jobs.*method)(call.id());
+  const auto done = (context.jobs.*method)(call.id(), call.request.principal.name);
   if (!done) return failure(done.error(), call);
   return json_response(done->changed ? 202 : 200, encode_job(done->view));
 }
@@ -128,6 +128,7 @@ http::Response post_job(Context& context, const Call& call) {
                                {"estimate", encode_estimate(estimate(spec->run))}});
   }
   NewJob job = new_job(*spec);
+  job.submitted_by = call.request.principal.name;
   job.idempotency_key = *key;
   job.body_hash = hash_of(call.request.body);
   const auto submitted = context.jobs.submit(job);

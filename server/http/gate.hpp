@@ -23,6 +23,7 @@ namespace colony::server::http {
 struct GatePolicy {
   std::vector<std::string> allowed_hosts;  // lower case, without port
   std::uint16_t port = 0;                  // ours: an Origin with it is our own page
+  std::vector<std::string> cors_origins = {};  // other sites whose pages may ask, as an Origin says them, lower case
   std::size_t header_bytes_max = 0;
   std::size_t header_fields_max = 0;
   std::size_t target_bytes_max = 0;
@@ -36,6 +37,8 @@ struct Refusal {
   std::string code;  // of the problem type
   std::string title;
   std::string detail;
+  std::string challenge = {};        // WWW-Authenticate; empty: none
+  std::int64_t retry_after_s = 0;    // 0: no Retry-After
 };
 
 /// Finds the end of a header in bytes that arrive in pieces, each byte looked at once.
@@ -68,6 +71,7 @@ struct RequestHead {
   bool keep_alive = true;
   bool expects_continue = false;
   std::string request_id;  // the client's if it is acceptable, else empty
+  std::string cors_origin;  // the Origin, if it is one of cors_origins; else empty
 };
 
 /// `bytes` is a header as HeadScanner found it. What could be read before a refusal stands in `head`, for

@@ -32,9 +32,9 @@ class LocalJobService final : public JobService {
   Result<Page> list(const JobFilter& filter, std::size_t limit, const std::string& cursor) override;
   Result<std::vector<std::uint64_t>> counts() override;
 
-  Result<Commanded> cancel(const std::string& id) override;
-  Result<Commanded> pause(const std::string& id) override;
-  Result<Commanded> resume(const std::string& id) override;
+  Result<Commanded> cancel(const std::string& id, const std::string& actor) override;
+  Result<Commanded> pause(const std::string& id, const std::string& actor) override;
+  Result<Commanded> resume(const std::string& id, const std::string& actor) override;
   Status remove(const std::string& id) override;
 
   Result<std::vector<Event>> events(const std::string& id, const EventFilter& filter, std::size_t limit) override;
@@ -64,7 +64,8 @@ class LocalJobService final : public JobService {
   bool is_stalled(std::int64_t job_key, std::uint64_t ticket) const;  // mutex_ is held
   void nudge_runners();
   JobView view_of(JobRow job);
-  Result<Commanded> command(const std::string& id, JobCommand command, LiveJob::Wish wish);
+  Result<Commanded> command(const std::string& id, JobCommand command, LiveJob::Wish wish,
+                            const std::string& actor);
   /// Waits until no runner holds the job; false after command_wait_ms or when draining.
   bool wait_until_left(std::int64_t job_key);
 

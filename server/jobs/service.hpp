@@ -77,9 +77,10 @@ class JobService {
 
   /// `changed` false: the job was already in the state this leads to. Another terminal state: kConflict ("job-terminal").
   struct Commanded { JobView view; bool changed = true; };
-  virtual Result<Commanded> cancel(const std::string& id) = 0;
-  virtual Result<Commanded> pause(const std::string& id) = 0;
-  virtual Result<Commanded> resume(const std::string& id) = 0;
+  /// `actor`: who asks; it goes into the job's log with what was done.
+  virtual Result<Commanded> cancel(const std::string& id, const std::string& actor) = 0;
+  virtual Result<Commanded> pause(const std::string& id, const std::string& actor) = 0;
+  virtual Result<Commanded> resume(const std::string& id, const std::string& actor) = 0;
   virtual Status remove(const std::string& id) = 0;
 
   virtual Result<std::vector<Event>> events(const std::string& id, const EventFilter& filter, std::size_t limit) = 0;

@@ -11,6 +11,9 @@ namespace colony::server {
 
 /// Now, RFC 3339 UTC with milliseconds: 2026-11-22T05:36:07.123Z.
 std::string wall_time_text();
+/// Another moment in the same form, and back; nullopt for any other text.
+std::string wall_time_text_at(std::int64_t unix_ms);
+std::optional<std::int64_t> unix_ms_of(std::string_view text);
 
 /// A new UUID of version 7, lower case: milliseconds since 1970, then 74 random bits.
 std::string new_job_id();

@@ -101,13 +101,14 @@ class FailingStore final : public server::Store {
     if (set && after_set_state) after_set_state(to, reason);
     return set;
   }
-  Result<Commanded> command_job(std::int64_t job_key, server::JobCommand command) override {
-    return real_->command_job(job_key, command);
+  Result<Commanded> command_job(std::int64_t job_key, server::JobCommand command, const std::string& actor) override {
+    return real_->command_job(job_key, command, actor);
   }
   Status delete_job(std::int64_t job_key) override { return real_->delete_job(job_key); }
   Result<std::vector<JobRow>> running_jobs() override { return real_->running_jobs(); }
   Status flush() override { return real_->flush(); }
   server::AnalysisStore& analyses() override { return real_->analyses(); }
+  server::TokenStore& tokens() override { return real_->tokens(); }
   Result<std::vector<Event>> read_events(std::int64_t job_key, const server::EventFilter& filter,
                                          std::size_t limit) override {
     ++event_reads;
