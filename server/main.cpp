@@ -46,9 +46,9 @@ std::uint64_t usable_cores() {
   return std::max(1U, std::thread::hardware_concurrency());
 }
 
-std::string text_of(const Error& error) {
+std::string text_of(const Error& error, const char* separator) {
   std::string text = error.message;
-  for (const FieldError& field : error.fields) text += "\n  " + field.pointer + ": " + field.message;
+  for (const FieldError& field : error.fields) text += separator + field.pointer + ": " + field.message;
   return text;
 }
 
@@ -80,7 +80,7 @@ class Log {
   void info(const std::string& text) const { write(log_event(format_, wall_time_text(), "info", text)); }
   void warn(const std::string& text) const { write(log_event(format_, wall_time_text(), "warning", text)); }
   int fail(const std::string& what, const Error& error) const {
-    write(log_event(format_, wall_time_text(), "error", what + ": " + text_of(error)));
+    write(log_event(format_, wall_time_text(), "error", what + ": " + text_of(error, "; ")));
     return 1;
   }
   void access(const http::AccessRecord& record) const { write(log_access(format_, wall_time_text(), record)); }
@@ -169,7 +169,7 @@ int run(int argc, char** argv) {
   const auto invocation = configure(std::vector<std::string>(argv + 1, argv + argc), environment(), COLONY_VERSION,
                                     usable_cores());
   if (!invocation) {
-    spdlog::error("{}", text_of(invocation.error()));
+    spdlog::error("{}", text_of(invocation.error(), "\n  "));
     return 2;
   }
   if (!invocation->print.empty()) {

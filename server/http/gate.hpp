@@ -23,13 +23,13 @@ namespace colony::server::http {
 struct GatePolicy {
   std::vector<std::string> allowed_hosts;  // lower case, without port
   std::uint16_t port = 0;                  // ours: an Origin with it is our own page
-  std::vector<std::string> cors_origins = {};  // other sites whose pages may ask, as an Origin says them, lower case
   std::size_t header_bytes_max = 0;
   std::size_t header_fields_max = 0;
   std::size_t target_bytes_max = 0;
   std::size_t body_bytes_max = 0;
   std::string large_body_path = {};      // with the base path; a POST there may have a larger body. Empty: none
   std::size_t large_body_bytes_max = 0;
+  std::vector<std::string> cors_origins = {};  // other sites whose pages may ask, as an Origin says them, lower case
 };
 
 struct Refusal {

@@ -101,7 +101,8 @@ class FailingStore final : public server::Store {
     if (set && after_set_state) after_set_state(to, reason);
     return set;
   }
-  Result<Commanded> command_job(std::int64_t job_key, server::JobCommand command, const std::string& actor) override {
+  Result<Commanded> command_job(std::int64_t job_key, server::JobCommand command,
+                                const std::string& actor = {}) override {
     return real_->command_job(job_key, command, actor);
   }
   Status delete_job(std::int64_t job_key) override { return real_->delete_job(job_key); }

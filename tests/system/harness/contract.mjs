@@ -15,7 +15,7 @@ const formats = {
 const methods = ['get', 'put', 'post', 'delete', 'options', 'head', 'patch', 'trace'];
 
 /** What the request gate may answer to anything before it looks at the path. */
-const gateStatuses = [400, 403, 408, 413, 414, 421, 431, 503];
+const gateStatuses = [400, 401, 403, 408, 413, 414, 421, 429, 431, 503];
 
 export class Contract {
   constructor(openapi) {
