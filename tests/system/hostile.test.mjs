@@ -119,7 +119,7 @@ test('hostile requests', async (t) => {
     data, token: root,
     args: ['--auth.mode', 'required', '--log.format', 'json', '--server.base-path', base, '--server.behind-proxy', 'true', '--limits.failed-tokens-per-min', '0'],
   });
-  const proxy = await startNginx(t, data, server.port, base);
+  const nginx = await startNginx(t, data, server.port, base);
   const place = { base, fields: [`Authorization: Bearer ${root}`] };
   const { get, host } = maker(place);
   const before = await server.counts();
@@ -144,23 +144,29 @@ test('hostile requests', async (t) => {
     });
   }
 
+  // What is well-formed once nginx has read it may be carried out: it was let in.
+  let admitted = 0;
   for (const [what, bytes] of rows) {
     await t.test(`through nginx: ${what}`, async () => {
-      const { responses } = await sendRaw(proxy, Buffer.from(`${bytes}${get('/healthz', [host, 'Connection: close'])}`, 'latin1'), { isHead: bytes.startsWith('HEAD'), foreign: true });
+      const { responses } = await sendRaw(nginx.port, Buffer.from(`${bytes}${get('/healthz', [host, 'Connection: close'])}`, 'latin1'), { isHead: bytes.startsWith('HEAD'), foreign: true });
       const got = responses.map(({ status }) => status);
       record('nginx', what, got[0] ?? 'closed');
       assert.ok(got.every((status) => status < 500 || status === 501 || status === 505), `answers: ${got}`);
       // Nobody else's request on the kept connections got a wrong answer.
-      const { responses: [next] } = await sendRaw(proxy, get('/v1/jobs/counts', [host, 'Connection: close']));
+      const { responses: [next] } = await sendRaw(nginx.port, get('/v1/jobs/counts', [host, 'Connection: close']));
       assert.equal(next.status, 200);
-      assert.deepEqual(next.json, before);
+      admitted += got.filter((status) => status === 201).length;
+      assert.equal(Object.values(next.json).reduce((sum, count) => sum + count), admitted);
     });
   }
 
   await t.test('nothing smuggled was carried out', () => {
-    const paths = server.err.trim().split('\n').map((line) => JSON.parse(line)).filter(({ event }) => event === 'request').map(({ path }) => path);
-    assert.ok(paths.length > rows.length);
-    assert.ok(!paths.some((path) => path.includes('smuggled')));
+    const requests = server.err.trim().split('\n').map((line) => JSON.parse(line)).filter(({ event }) => event === 'request');
+    assert.ok(requests.length > rows.length);
+    // An attacker may ask for it plainly, behind another request of their own; then nginx has seen it, too.
+    const seen = nginx.seen();
+    const hidden = requests.filter(({ path, request_id }) => path.includes('smuggled') && !seen.has(request_id));
+    assert.deepEqual(hidden, []);
     assert.ok(!server.err.includes(submitter.slice(7, 20)), 'a token sent in the wrong place is not in the log');
   });
 });
@@ -195,9 +201,10 @@ test('slow headers, bodies and readers', async (t) => {
       }
       const out = await run;
       assert.match(out, /service available:\s+YES/, out.slice(-1500));
-      const closed = Number(/closed:\s+(\d+)/.exec(out.slice(out.lastIndexOf('closed:')))?.[1] ?? 0);
-      record('slow', `${what}, 60 connections`, `${closed} cut, ${served} others served`);
-      if (mode !== '-X') assert.ok(closed >= 60, `each was cut: ${out.slice(-1500)}`);
+      const end = /Exit status:\s+(.*)/.exec(out)?.[1] ?? '';
+      record('slow', `${what}, 60 connections (beside ${served} others, served)`, end);
+      // A slow reader still reads from its own kernel what ours has long got rid of: what it says of itself proves nothing.
+      if (mode !== '-X') assert.equal(end, 'No open connections left', out.slice(-1500));
     });
   }
 });
@@ -205,12 +212,13 @@ test('slow headers, bodies and readers', async (t) => {
 test('caps, each with its own answer', async (t) => {
   const server = await startServer(t, { args: ['--limits.count-loopback', 'true', '--limits.connections-per-address-max', '3', '--limits.requests-per-s', '1', '--limits.requests-burst', '8'] });
   const get = maker().get('/healthz', [maker().host]);
-  const held = await Promise.all([1, 2, 3].map(() => sendRaw(server.port, get, { count: 1, keep: true })));
-  const { responses: [refused] } = await sendRaw(server.port, get, { count: 1 });
-  assert.equal(refused.status, 503);
-  assert.match(refused.text, /your address/);
-  record('caps', 'a fourth connection of one address', refused.status);
-  for (const { socket } of held) socket.destroy();
+  const kept = [];
+  for (let i = 0; i < 10; ++i) kept.push(await sendRaw(server.port, get, { count: 1, keep: true }));
+  const refused = kept.filter(({ responses }) => responses[0].status === 503);
+  assert.ok(refused.length >= 7 && refused.length <= 8, 'three, less one of the harness that may not have gone yet');
+  assert.match(refused[0].responses[0].text, /your address/);
+  record('caps', 'a fourth connection of one address', 503);
+  for (const { socket } of kept) socket.destroy();
   let status = 200;
   let retry = '';
   for (let i = 0; i < 100 && status !== 429; ++i) {

@@ -94,7 +94,8 @@ std::string founders(int count) {
 
 TEST(Submit, OneAtATimeMayHaveManyFounders) {
   FakeJobs jobs;
-  api::Context context{jobs, ApiFixture::config(), false, {}, {}, true};  // another one is at it
+  http::TokenTable tokens;
+  api::Context context{jobs, tokens, ApiFixture::config(), false, {}, {}, true};  // another one is at it
   for (const char* query : {"", "dry_run"}) {
     auto refused = submitted_to(context, query, founders(1001));
     EXPECT_EQ(refused.status, 503);

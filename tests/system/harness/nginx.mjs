@@ -1,6 +1,6 @@
 // nginx: a real reverse proxy before a server, on a free port, in a folder of its own, ended by its pid.
 import { spawn } from 'node:child_process';
-import { mkdirSync, writeFileSync } from 'node:fs';
+import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import net from 'node:net';
 import { join } from 'node:path';
 import { cleanup } from './cleanup.mjs';
@@ -21,7 +21,10 @@ const canConnect = (port) => new Promise((done) => {
   socket.on('error', () => done(false));
 });
 
-/** Passes everything under `base` to `upstream` over kept connections: what one request hides, the next would meet. Gives the port. */
+/**
+ * Passes everything under `base` to `upstream` over kept connections: what one request hides, the next would meet. Each request gets an id
+ * from it. Gives {port, seen}; seen() is the ids of the requests that it has read.
+ */
 export async function startNginx(t, folder, upstream, base) {
   const port = await freePort();
   mkdirSync(join(folder, 'nginx'), { recursive: true });
@@ -30,7 +33,8 @@ export async function startNginx(t, folder, upstream, base) {
     daemon off; master_process off; worker_processes 1; pid ${at('pid')}; error_log ${at('error.log')};
     events { worker_connections 256; }
     http {
-      access_log ${at('access.log')};
+      log_format id '$request_id';
+      access_log ${at('access.log')} id;
       ${['client_body', 'proxy', 'fastcgi', 'uwsgi', 'scgi'].map((name) => `${name}_temp_path ${at(name)};`).join(' ')}
       client_max_body_size 40m;
       upstream colonyd { server 127.0.0.1:${upstream}; keepalive 4; }
@@ -41,6 +45,7 @@ export async function startNginx(t, folder, upstream, base) {
           proxy_http_version 1.1;
           proxy_set_header Host $host;
           proxy_set_header Connection "";
+          proxy_set_header X-Request-Id $request_id;
           proxy_set_header X-Forwarded-For $proxy_add_x_forwarded_for;
           proxy_request_buffering off;
           proxy_buffering off;
@@ -60,5 +65,5 @@ export async function startNginx(t, folder, upstream, base) {
     process.removeListener('exit', kill);
   });
   await eventually('nginx to listen', () => canConnect(port), 20_000);
-  return port;
+  return { port, seen: () => new Set(readFileSync(at('access.log'), 'utf8').split('\n')) };
 }
