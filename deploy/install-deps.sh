@@ -12,6 +12,7 @@ packages=(
   nlohmann-json3-dev        # server/api, client
   libeigen3-dev librandom123-dev libxxhash-dev libhwy-dev libspng-dev libtbb-dev   # engine
   libtiff-dev zlib1g-dev libturbojpeg0-dev libopencv-core-dev libopencv-imgproc-dev   # engine/analysis: real images; engine/picture: OME-TIFF
+  libexpat1-dev             # engine/analysis: the scale that an OME-TIFF states
   libsqlite3-dev sqlite3                                     # server/store; the shell reads the database in the tests
   libspdlog-dev libtomlplusplus-dev                          # server
   libssl-dev                # server/http: TLS, and tokens' randomness and hashes

@@ -10,6 +10,7 @@
 #include "client/cli/commands.hpp"
 #include "client/cli/output.hpp"
 #include "client/cli/problem.hpp"
+#include "client/cli/report.hpp"
 
 namespace colony::client {
 namespace {
@@ -20,7 +21,7 @@ constexpr std::chrono::milliseconds kPollInterval{500};
 struct FileOptions {
   std::string id, output;
   std::optional<std::string> at_h, triangles_max;
-  bool no_nuclei = false;
+  bool no_nuclei = false, cells = false;
 };
 
 /// Copies an answer of any type to the output.
@@ -58,9 +59,10 @@ ExitCode fetch_mesh(Session& session, const FileOptions& options) {
 std::string line_text(const Json& line) {
   const Json& d0 = line.at("d0");
   if (d0.is_null()) return "none: " + printable(line.at("reason").get<std::string>());
-  const Json& crossover = line.at("crossover").at("found");
+  const Json& crossover = line.at("crossover");  // of a sweep's row the finding itself
+  const bool is_crossover = crossover.is_object() ? crossover.at("found").get<bool>() : crossover.get<bool>();
   return member_text(d0, "value") + " (se " + member_text(d0, "se", 3) + ", boxes of " + d0.at("range_px")[0].dump() + " to " +
-         d0.at("range_px")[1].dump() + " px" + (crossover.get<bool>() ? ", a crossover)" : ")");
+         d0.at("range_px")[1].dump() + " px" + (is_crossover ? ", a crossover)" : ")");
 }
 
 void print_lines(std::ostream& out, const Json& measured) {
@@ -75,9 +77,22 @@ void print_verdict(std::ostream& out, const Json& measured) {
   for (const Json& sentence : measured.at("verdict")) out << "- " << printable(sentence.get<std::string>()) << '\n';
 }
 
+/// The dimensions against the threshold, a line each.
+void print_sweep(std::ostream& out, const Json& measured) {
+  for (const Json& row : measured.at("threshold_sweep").at("rows")) {
+    out << "  threshold " << row.at("threshold").dump() << ": walls " << line_text(row.at("walls")) << ", outline "
+        << line_text(row.at("outline")) << '\n';
+  }
+}
+
 ExitCode measure(Session& session, const FileOptions& options) {
   Target target = job_target(resolve_job_id(session, options.id), "/analysis");
   target.add_if("at_h", options.at_h);
+  if (options.cells) {
+    if (session.json) throw Failure(ExitCode::kUsage, "--json: the cells are a table; without --cells the measurements are JSON");
+    return fetch_file(session, target, "text/csv", options.output);
+  }
+  if (!options.output.empty()) throw Failure(ExitCode::kUsage, "--output: is for --cells");
   const HttpResponse response = session.client().send({.target = target.text()});
   require_ok(response);
   if (session.json) {
@@ -92,7 +107,7 @@ ExitCode measure(Session& session, const FileOptions& options) {
 }
 
 struct AnalyzeOptions {
-  std::string file, steps;
+  std::string file, steps, objects, html;
   std::optional<std::string> name, um_per_px, foreground, channel, threshold, pipeline;
   bool clahe = false;
 };
@@ -143,6 +158,31 @@ void save_steps(Session& session, const Json& row, const std::string& folder) {
   }
 }
 
+/// Where the scale comes from, if there is one.
+std::string scale_text(const Json& image) {
+  const std::string source = image.at("um_per_px_source").get<std::string>();
+  if (image.at("um_per_px").is_null()) return "no scale: lengths are in pixels; --um-per-px gives one";
+  return "scale " + member_text(image, "um_per_px", 4) + " um a pixel, " +
+         (source == "given" ? "as asked for" : source == "ome" ? "by the file's OME metadata" : "by " + printable(source));
+}
+
+/// The same as one page, with the picture of what was counted.
+void save_page(Session& session, const Json& row, const std::string& path) {
+  AnalysisPageInput input;
+  input.analysis = row;
+  for (const char* step : {"grey", "overlay"}) {
+    HttpRequest request;
+    request.target = row.at("links").at("steps").get<std::string>() + "/" + step;
+    request.accept = "image/png";
+    HttpResponse response = session.client().send(request);
+    require_ok(response);
+    input.pictures.emplace_back(step, std::move(response.body));
+  }
+  Output output(session.env, path);
+  output.write(analysis_html(input));
+  output.finish();
+}
+
 ExitCode analyze(Session& session, const AnalyzeOptions& options) {
   HttpRequest request;
   request.method = "POST";
@@ -159,6 +199,10 @@ ExitCode analyze(Session& session, const AnalyzeOptions& options) {
   request.target = target.text();
   const Json row = when_done(session, session.client().send(request));
   if (!options.steps.empty()) save_steps(session, row, options.steps);
+  if (!options.objects.empty()) {
+    fetch_file(session, Target(row.at("links").at("objects").get<std::string>()), "text/csv", options.objects);
+  }
+  if (!options.html.empty()) save_page(session, row, options.html);
   std::ostream& out = session.env.out;
   if (session.json) {
     out << row.dump() << '\n';
@@ -169,8 +213,15 @@ ExitCode analyze(Session& session, const AnalyzeOptions& options) {
   out << "analysis " << row.at("id").get<std::string>() << '\n'
       << member_text(segmentation, "object_count") << " objects (" << printable(member_text(segmentation, "pipeline")) << ", threshold "
       << member_text(segmentation, "threshold") << "), mean area " << member_text(segmentation, "area_mean_px", 1) << " px, "
-      << member_text(segmentation, "foreground_share", 3) << " of the field covered\n";
+      << member_text(segmentation, "foreground_share", 3) << " of the field covered\n"
+      << "pipeline " << printable(member_text(segmentation, "pipeline")) << ", "
+      << printable(segmentation.at("pipeline_reason").get<std::string>()) << '\n'
+      << "foreground " << printable(member_text(segmentation, "foreground")) << ", "
+      << printable(segmentation.at("foreground_reason").get<std::string>()) << '\n'
+      << scale_text(result.at("image")) << '\n';
+  for (const Json& note : result.at("image").at("notes")) out << "note: " << printable(note.get<std::string>()) << '\n';
   print_lines(out, result);
+  print_sweep(out, result);
   print_verdict(out, result);
   return ExitCode::kDone;
 }
@@ -229,7 +280,8 @@ void add_measure_commands(CLI::App& app, Session& session, Action& action) {
   command->callback([&session, &action, mesh] { action = [&session, mesh] { return fetch_mesh(session, *mesh); }; });
 
   auto measured = std::make_shared<FileOptions>();
-  command = add_file_command(app, "measure", "Measurements of a colony, with controls, and what follows from them", *measured, false);
+  command = add_file_command(app, "measure", "Measurements of a colony, with controls, and what follows from them", *measured, true);
+  command->add_flag("--cells", measured->cells, "The shape of each cell instead, as CSV");
   command->callback([&session, &action, measured] { action = [&session, measured] { return measure(session, *measured); }; });
 
   auto picture = std::make_shared<AnalyzeOptions>();
@@ -243,6 +295,8 @@ void add_measure_commands(CLI::App& app, Session& session, Action& action) {
   command->add_option("--pipeline", picture->pipeline, "auto, nuclei, phase or contours");
   command->add_flag("--clahe", picture->clahe, "Even the local contrast first");
   command->add_option("--steps", picture->steps, "Folder for a picture of every step");
+  command->add_option("--objects", picture->objects, "File for the shape of each object (CSV)");
+  command->add_option("--html", picture->html, "File for everything on one page");
   command->callback([&session, &action, picture] { action = [&session, picture] { return analyze(session, *picture); }; });
 
   auto both = std::make_shared<CompareOptions>();

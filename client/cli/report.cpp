@@ -110,6 +110,44 @@ std::string fractal_section(const Json& analysis) {
          "</table>";
 }
 
+/// The dimensions against the threshold: a curve each and the table.
+std::string sweep_section(const Json& sweep) {
+  Curve walls{"cell walls", "#000", {}}, outline{"colony outline", "#1f77b4", {}};
+  std::string rows;
+  for (const Json& row : sweep.at("rows")) {
+    const double threshold = row.at("threshold").get<double>();
+    rows += "<tr><td class=n>" + row.at("threshold").dump() + "</td>";
+    for (const auto& [name, curve] : {std::pair("walls", &walls), std::pair("outline", &outline)}) {
+      const Json& d0 = row.at(name).at("d0");
+      if (d0.is_null()) {
+        rows += "<td colspan=3>" + html_text(row.at(name).at("reason").get<std::string>()) + "</td>";
+        continue;
+      }
+      curve->points.emplace_back(threshold, d0.at("value").get<double>());
+      rows += "<td class=n>" + number(d0.at("value").get<double>(), 3) + "</td><td class=n>" + number(d0.at("se").get<double>(), 3) +
+              "</td><td>" + (row.at(name).at("crossover").get<bool>() ? "crossover" : "no drift found") + "</td>";
+    }
+    rows += "</tr>";
+  }
+  return "<h2>Against the threshold</h2>" + curves_svg({walls, outline}, "threshold, grey level", "D0", false) +
+         "<table><tr><th>threshold</th><th>walls D0</th><th>se</th><th>local slopes</th><th>outline D0</th><th>se</th><th>local "
+         "slopes</th></tr>" + rows + "</table>";
+}
+
+std::string figures(const std::vector<std::pair<std::string, std::string>>& pictures) {
+  std::string out;
+  for (const auto& [caption, png] : pictures) {
+    out += "<figure><img alt=\"" + html_text(caption) + "\" src=\"data:image/png;base64," + base64(png) + "\"><figcaption>" +
+           html_text(caption) + "</figcaption></figure>";
+  }
+  return out;
+}
+
+std::string page_head(const std::string& title) {
+  return "<!doctype html><html lang=en><head><meta charset=utf-8><title>" + html_text(title) + "</title><style>" + std::string(kStyle) +
+         "</style></head><body><h1>" + html_text(title) + "</h1>";
+}
+
 std::string shape_section(const Json& analysis) {
   std::string rows;
   for (const char* name : {"colony", "cells", "apart", "packing", "growth"}) add_leaves(analysis.at(name), name, rows);
@@ -193,7 +231,8 @@ std::string curves_svg(const std::vector<Curve>& curves, const std::string& x_ti
   }
   text((kLeft + kWidth) / 2, kHeight - 10, "middle", x_title, "#000");
   text(kLeft, kTop - 3, "start", y_title, "#000");
-  double legend = kTop + 16;
+  // Where curves usually are not: log-log ones fall to the right, the others rise or lie high.
+  double legend = is_logarithmic ? kTop + 16 : kHeight - kBottom - 6 - 15 * (static_cast<double>(curves.size()) - 1);
   for (const Curve& curve : curves) {
     if (curve.points.empty()) continue;
     std::string path;
@@ -212,8 +251,7 @@ std::string report_html(const ReportInput& input) {
   const Json& job = input.job;
   const std::string name = job.at("name").get<std::string>();
   const std::string title = name.empty() ? "Colony " + job.at("id").get<std::string>() : name;
-  std::string out = "<!doctype html><html lang=en><head><meta charset=utf-8><title>" + html_text(title) + "</title><style>" +
-                    std::string(kStyle) + "</style></head><body><h1>" + html_text(title) + "</h1><table>";
+  std::string out = page_head(title) + "<table>";
   for (const char* member : {"id", "state", "reason", "created_at", "finished_at", "engine_version"}) {
     out += table_row(member, cell_text(job.at(member)));
   }
@@ -222,16 +260,27 @@ std::string report_html(const ReportInput& input) {
   }
   out += table_row("events", member_text(job, "last_seq"));
   out += "<tr><th>digest</th><td><code>" + html_text(job.at("digest").get<std::string>()) + "</code></td></tr></table>";
-  out += "<h2>Pictures</h2>";
-  for (const auto& [caption, png] : input.pictures) {
-    out += "<figure><img alt=\"" + html_text(caption) + "\" src=\"data:image/png;base64," + base64(png) + "\"><figcaption>" +
-           html_text(caption) + "</figcaption></figure>";
-  }
+  out += "<h2>Pictures</h2>" + figures(input.pictures);
   out += growth_section(input.series);
   if (!input.analysis.is_null()) out += fractal_section(input.analysis) + shape_section(input.analysis);
   std::string rows;
   add_leaves(job.at("spec"), "", rows);
   return out + "<h2>Parameters</h2><table>" + rows + "</table></body></html>\n";
+}
+
+std::string analysis_html(const AnalysisPageInput& input) {
+  const Json& analysis = input.analysis;
+  const Json& result = analysis.at("result");
+  const std::string name = analysis.at("name").get<std::string>();
+  std::string rows;
+  for (const char* member : {"id", "created_at", "media_type", "image_bytes"}) rows += table_row(member, cell_text(analysis.at(member)));
+  add_leaves(result.at("image"), "image", rows);
+  Json segmentation = result.at("segmentation");
+  segmentation.erase("sweep");
+  add_leaves(segmentation, "segmentation", rows);
+  return page_head(name.empty() ? "Analysis " + analysis.at("id").get<std::string>() : name) + figures(input.pictures) +
+         fractal_section(result) + sweep_section(result.at("threshold_sweep")) + "<h2>What was done</h2><table>" + rows +
+         "</table></body></html>\n";
 }
 
 }  // namespace colony::client

@@ -1,4 +1,4 @@
-// report: one self-contained HTML page about a job: no scripts, and nothing is loaded from anywhere.
+// report: one self-contained HTML page about a job or an analysed picture: no scripts, and nothing is loaded from anywhere.
 // Promise: every text from the server is escaped; pictures are data URIs, curves inline SVG.
 // Threads: pure.
 #pragma once
@@ -20,6 +20,13 @@ struct ReportInput {
 };
 
 std::string report_html(const ReportInput& input);
+
+/// A picture that was analysed, as POST /v1/analyses answers.
+struct AnalysisPageInput {
+  Json analysis;
+  std::vector<std::pair<std::string, std::string>> pictures;
+};
+std::string analysis_html(const AnalysisPageInput& input);
 
 std::string base64(std::string_view bytes);
 std::string html_text(std::string_view text);

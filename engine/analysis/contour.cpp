@@ -128,12 +128,4 @@ Result<BinaryImage> cell_walls(const LabelImage& labels) {
       });
 }
 
-Result<BinaryImage> boundary_of(const BinaryImage& image) {
-  if (const Status status = check_image(image, "image"); !status) return status.error();
-  return draw_border(
-      image.width_px, image.height_px, image.um_per_px,
-      [&](std::int64_t row, std::int64_t column) { return image.at(row, column) != 0; },
-      [&](std::int64_t, std::int64_t, std::int64_t row, std::int64_t column) { return image.at(row, column) == 0; });
-}
-
 }  // namespace colony

@@ -1,4 +1,4 @@
-// contour: the lines that are box counted: colony outline, cell walls, boundary of a set; one pixel wide, as binary images (0, 255).
+// contour: the lines that are box counted: colony outline and cell walls; one pixel wide, as binary images (0, 255).
 // Rule:    of the two pixels beside a border the one with the higher label is drawn (background is 0): each border once, so the lines
 //          are 8-connected, and no 4-connected path leads from one label to another, or out of one, except over a drawn pixel.
 // Frame:   what lies beyond the frame is unknown, so its edge is never a border: a colony that is cut by the frame has no outline there.
@@ -25,9 +25,6 @@ Result<BinaryImage> colony_outline(const BinaryImage& image);
 
 /// All borders between labels, and between labels and background, holes included: what a picture of cell contours shows.
 Result<BinaryImage> cell_walls(const LabelImage& labels);
-
-/// Foreground pixels with a 4-neighbour in the background.
-Result<BinaryImage> boundary_of(const BinaryImage& image);
 
 /// Foreground where a label is not 0.
 BinaryImage foreground_of(const LabelImage& labels);

@@ -45,6 +45,7 @@ struct DecodedImage {
   std::int64_t channel_count = 0;
   int bits = 8;  // 8 or 16: what the samples were stored with; fewer bits of a PNG are spread over 0..255
   std::optional<double> um_per_px_stated;  // PNG pHYs; TIFF resolution in cm, or in the micron of an ImageJ description
+  std::optional<double> um_per_px_ome;     // by OME-XML: what a microscope was set to, not what a printer should do
   std::vector<std::uint16_t> samples;      // height x width x channel_count
   std::vector<std::string> notes;          // what was left out or changed in reading, in words
 

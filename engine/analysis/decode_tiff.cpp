@@ -3,10 +3,12 @@
 #include <cstdarg>
 #include <cstdio>
 #include <cstring>
+#include <iterator>
 #include <memory>
 #include <tiffio.h>
 
 #include "engine/analysis/decode_parts.hpp"
+#include "engine/analysis/ome_xml.hpp"
 #include "engine/base/check.hpp"
 
 namespace colony::decode_parts {
@@ -247,6 +249,14 @@ Status Reader::append(const Page& page, DecodedImage& image, std::int64_t first_
 }
 
 void Reader::read_scale(DecodedImage& image) const {
+  const char* text = nullptr;
+  TIFFGetField(tiff_.get(), TIFFTAG_IMAGEDESCRIPTION, &text);
+  const std::string_view whole(text == nullptr ? "" : text, text == nullptr ? 0 : ::strnlen(text, kOmeTextMax_bytes + 1));
+  if (is_ome_xml(whole)) {
+    OmeScale ome = read_ome_scale(whole);
+    image.um_per_px_ome = ome.um_per_px;
+    std::move(ome.notes.begin(), ome.notes.end(), std::back_inserter(image.notes));
+  }
   float x = 0.0F, y = 0.0F;
   if (TIFFGetField(tiff_.get(), TIFFTAG_XRESOLUTION, &x) == 0 ||
       TIFFGetField(tiff_.get(), TIFFTAG_YRESOLUTION, &y) == 0)
@@ -254,10 +264,7 @@ void Reader::read_scale(DecodedImage& image) const {
   if (!(x > 0.0F && x < 1e9F && x == y)) return;
   std::uint16_t unit = RESUNIT_INCH;
   TIFFGetFieldDefaulted(tiff_.get(), TIFFTAG_RESOLUTIONUNIT, &unit);
-  const char* text = nullptr;
-  TIFFGetField(tiff_.get(), TIFFTAG_IMAGEDESCRIPTION, &text);
-  const std::string_view description(text == nullptr ? "" : text,
-                                     text == nullptr ? 0 : ::strnlen(text, kDescriptionMax_bytes));
+  const std::string_view description = whole.substr(0, kDescriptionMax_bytes);
   const bool micron = description.starts_with("ImageJ") && (description.find("unit=micron") != description.npos ||
                                                             description.find("unit=um") != description.npos ||
                                                             description.find("unit=\\u00B5m") != description.npos);

@@ -5,6 +5,8 @@
 #include <opencv2/core.hpp>
 #include <tuple>
 
+#include "engine/analysis/ome_xml.hpp"
+
 namespace colony {
 namespace {
 
@@ -21,6 +23,28 @@ std::pair<int, int> window_of(const std::vector<std::uint16_t>& values) {
   for (std::int64_t seen = counts[0]; seen <= spare; seen += counts[static_cast<std::size_t>(low)]) ++low;
   for (std::int64_t seen = counts[65535]; seen <= spare; seen += counts[static_cast<std::size_t>(high)]) --high;
   return {low, high};
+}
+
+/// The scale that is used, and in the notes what was not.
+std::optional<double> scale_of(const DecodedImage& image, std::optional<double> given, ImageMetadata& metadata) {
+  const std::optional<double> ome = image.um_per_px_ome, tags = image.um_per_px_stated;
+  metadata.um_per_px_stated = ome ? ome : tags;
+  if (given) {
+    metadata.scale_source = ScaleSource::kGiven;
+    if (metadata.um_per_px_stated && scales_differ(*given, *metadata.um_per_px_stated)) {
+      metadata.notes.push_back("um_per_px is " + scale_text(*given) + " as asked for; the file says " +
+                               scale_text(*metadata.um_per_px_stated));
+    }
+    return given;
+  }
+  if (!ome) return {};
+  if (tags && scales_differ(*ome, *tags)) {
+    metadata.notes.push_back("no scale was used: the file's OME metadata says " + scale_text(*ome) + " um a pixel, its resolution " +
+                             scale_text(*tags) + ": give um_per_px");
+    return {};
+  }
+  metadata.scale_source = ScaleSource::kOme;
+  return ome;
 }
 
 }  // namespace
@@ -72,13 +96,12 @@ Result<ImageAnalysis> analyse_image(std::string_view bytes, const AnalysisOption
   metadata.height_px = decoded->height_px;
   metadata.channel_count = decoded->channel_count;
   metadata.bits = decoded->bits;
-  metadata.um_per_px_stated = decoded->um_per_px_stated;
   metadata.notes = std::move(decoded->notes);
+  result.um_per_px = scale_of(*decoded, options.um_per_px, metadata);
   Result<GreyImage> grey = grey_of(*decoded, options.channel, metadata);
   if (!grey) return grey.error();
   decoded->samples = {};  // not needed beside the steps
-  grey->um_per_px = options.um_per_px;
-  result.um_per_px = options.um_per_px;
+  grey->um_per_px = result.um_per_px;
 
   Result<Segmentation> segmentation = segment(*grey, options.segment, stop);
   if (!segmentation) return segmentation.error();
@@ -91,8 +114,8 @@ Result<ImageAnalysis> analyse_image(std::string_view bytes, const AnalysisOption
   const auto middle = areas.begin() + static_cast<std::ptrdiff_t>((areas.size() - 1) / 2);
   std::nth_element(areas.begin(), middle, areas.end());
   result.area_median_px = static_cast<double>(*middle);
-  if (options.um_per_px) {
-    const double um2_per_px = *options.um_per_px * *options.um_per_px;
+  if (result.um_per_px) {
+    const double um2_per_px = *result.um_per_px * *result.um_per_px;
     constexpr double kUm2PerMm2 = 1e6;
     result.area_mean_um2 = result.area_mean_px * um2_per_px;
     result.foreground_um2 = static_cast<double>(found.foreground_px) * um2_per_px;

@@ -1,6 +1,7 @@
 // image_analysis: a picture file of a microscope to what was counted in it.
 // Method:  decode.hpp, then one channel as 8 bits, then segment.hpp.
-// Units:   um where um_per_px is given, else pixels; a scale that the file states is reported, never used unasked: files often state a printer's.
+// Units:   um where um_per_px is given or OME metadata states it, else pixels. A scale that a file states in any other way is reported, never used
+//          unasked: it is often a printer's. Statements that contradict each other are not used either: a note says so, and um_per_px decides.
 // Limits:  DecodeLimits for the file; both sides at most kImageSideMax_px. Peak memory: the samples, then about 50 bytes a pixel with every step kept:
 //          1.7 GB for the 32 Mi pixels that are taken unless the caller says otherwise.
 // Errors:  those of decode_image and segment; kInvalid (fields `channel`, `um_per_px`).     Threads: pure, any thread.
@@ -21,6 +22,8 @@ struct AnalysisOptions {
   DecodeLimits limits = {.pixels_max = 32LL << 20};
 };
 
+enum class ScaleSource { kNone, kGiven, kOme };
+
 struct ImageMetadata {
   ImageFormat format = ImageFormat::kPng;
   ColourModel model = ColourModel::kGrey;
@@ -28,7 +31,8 @@ struct ImageMetadata {
   std::int64_t height_px = 0;
   std::int64_t channel_count = 0;
   int bits = 8;
-  std::optional<double> um_per_px_stated;  // by the file
+  std::optional<double> um_per_px_stated;  // by the file; by its OME metadata, if that says anything
+  ScaleSource scale_source = ScaleSource::kNone;  // of ImageAnalysis::um_per_px
   std::optional<std::int64_t> channel;     // none: luma
   int level_low = 0, level_high = 255;     // sample values that became grey 0 and 255
   std::vector<std::string> notes;
@@ -36,7 +40,7 @@ struct ImageMetadata {
 
 struct ImageAnalysis {
   ImageMetadata metadata;
-  std::optional<double> um_per_px;  // as given
+  std::optional<double> um_per_px;  // metadata.scale_source says from where
   Segmentation segmentation;
   std::int64_t object_count = 0;
   double foreground_share = 0.0;  // of field_px

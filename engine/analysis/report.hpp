@@ -16,15 +16,10 @@
 #include "engine/analysis/neighbours.hpp"
 #include "engine/analysis/radial.hpp"
 #include "engine/analysis/scaling.hpp"
+#include "engine/analysis/verdict.hpp"
 #include "engine/random/stream.hpp"
 
 namespace colony {
-
-/// Lines that were counted, or why not.
-struct MeasuredLine {
-  std::optional<BoxDimensions> dimensions = {};
-  std::string reason = {};                // where there are none
-};
 
 struct LineReport {
   MeasuredLine walls;                     // all borders of cells
@@ -36,6 +31,14 @@ struct ControlReport {
   std::string name;                       // without_noise, hexagonal, random_discs
   LineReport lines;
 };
+
+/// What follows from walls and outline, each beside the controls'.
+struct LineFindings {
+  LineFinding walls, outline;
+};
+LineFindings judge_lines(const LineReport& lines, const std::vector<ControlReport>& controls);
+/// Both in words, the walls first.
+std::vector<std::string> sentences_of(const LineFindings& findings);
 
 struct LabelReport {
   std::optional<double> um_per_px = {};
@@ -51,6 +54,7 @@ struct LabelReport {
   std::optional<SiblingStraightness> siblings = {};
   std::vector<Ring> rings;
   ApartCells apart;
+  LineFindings findings;
   std::vector<std::string> verdict;       // sentences
 };
 
@@ -70,22 +74,7 @@ Result<LabelReport> analyse_labels(const LabelInput& input, StopFlag stop = null
 /// Of a label image alone: its walls and outline.
 LineReport analyse_lines(const LabelImage& labels, std::int64_t gap_px, const BoxOptions& boxes, StopFlag stop = nullptr);
 
-/// One threshold of a sweep.
-struct ThresholdRow {
-  int threshold = 0;
-  double foreground_share = 0.0;
-  MeasuredLine set;                       // the foreground itself
-  MeasuredLine boundary;                  // its boundary
-};
-
-struct ThresholdSweep {
-  std::vector<std::int64_t> sides_px;     // the same for every row, from the frame's longer side: rows are comparable
-  std::vector<ThresholdRow> rows;
-};
-
-/// Foreground: grey >= threshold, or < threshold if `dark_foreground`. 1..64 rising thresholds in 1..255. Errors name `thresholds`.
-/// A dimension that hangs on the threshold is a property of the threshold.
-Result<ThresholdSweep> threshold_sweep(const GreyImage& image, const std::vector<int>& thresholds, bool dark_foreground,
-                                       const BoxOptions& boxes, StopFlag stop = nullptr);
+/// Counts a line, or says why it cannot be counted.
+MeasuredLine measure_line(const Result<BinaryImage>& line, const BoxOptions& boxes, StopFlag stop = nullptr);
 
 }  // namespace colony

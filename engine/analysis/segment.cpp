@@ -73,11 +73,29 @@ bool is_drawing(const GreyImage& image, const Look& look) {
   return 10 * after < before;
 }
 
+struct Choice {
+  Pipeline pipeline = Pipeline::kAuto;
+  std::string reason;
+};
+
 /// Fluorescence and stains leave the background at one end of the histogram, phase contrast in its middle.
-Pipeline choose_pipeline(const GreyImage& image, const Look& look) {
-  if (is_drawing(image, look)) return Pipeline::kContours;
+Choice choose_pipeline(const GreyImage& image, const Look& look) {
+  if (is_drawing(image, look)) return {Pipeline::kContours, "chosen: two levels, and the rarer one is thin lines: a drawing"};
   const int up = look.light - look.middle, down = look.middle - look.dark;
-  return std::max(up, down) > 3 * std::min(up, down) ? Pipeline::kNuclei : Pipeline::kPhase;
+  const std::string levels = " (grey levels at 1, 50 and 99 % of the pixels: " + std::to_string(look.dark) + ", " +
+                             std::to_string(look.middle) + ", " + std::to_string(look.light) + ")";
+  if (std::max(up, down) > 3 * std::min(up, down)) {
+    return {Pipeline::kNuclei, "chosen: most pixels are an even ground at one end of the histogram, as with a stain" + levels +
+                                   ". Whether it stains nuclei no histogram tells: of actin, membranes and other stains the objects are "
+                                   "no cells, and pipeline=phase finds regions of cells instead"};
+  }
+  return {Pipeline::kPhase, "chosen: the ground lies in the middle of the histogram, darker and lighter things on both sides, as with phase "
+                            "contrast" + levels + ". It finds regions of cells; pipeline=nuclei finds single stained objects"};
+}
+
+std::string foreground_reason(const Look& look, bool is_dark) {
+  return std::string("chosen: the ") + (is_dark ? "dark" : "light") + " end of the histogram lies further from its middle than the other (" +
+         std::to_string(look.dark) + ", " + std::to_string(look.middle) + ", " + std::to_string(look.light) + ")";
 }
 
 std::int64_t count_above(const BinaryImage& mask) {
@@ -227,6 +245,24 @@ GreyImage signal_of(const GreyImage& image, const SegmentOptions& options, Segme
   return signal;
 }
 
+/// Nine levels about the answer's own; `objects` makes those of the others.
+template <class MakeObjects>
+void sweep_levels(const SegmentOptions& options, StopFlag stop, Segmentation& result, const MakeObjects& make_objects) {
+  if (!options.sweep) return;
+  if (options.at_threshold) options.at_threshold({result.threshold, result.pipeline, result.mask, result.labels});
+  for (std::int64_t k = -kSweepSide; k <= kSweepSide; ++k) {
+    const std::int64_t at = result.threshold + k * kSweepStep;
+    if (at < 0 || at > 254) continue;
+    throw_if_stopped(stop);
+    const Objects other = k == 0 ? Objects{} : make_objects(static_cast<int>(at));
+    const std::vector<std::int64_t>& areas = k == 0 ? result.areas_px : other.areas_px;
+    std::int64_t sum = 0;
+    for (const std::int64_t area : areas) sum += area;
+    result.sweep.push_back({static_cast<int>(at), sum, static_cast<std::int64_t>(areas.size())});
+    if (k != 0 && options.at_threshold) options.at_threshold({static_cast<int>(at), result.pipeline, other.mask, other.labels});
+  }
+}
+
 }  // namespace
 
 StepImage overlay(const GreyImage& image, const LabelImage& labels) {
@@ -257,8 +293,13 @@ Result<Segmentation> segment(const GreyImage& image, const SegmentOptions& optio
                               "): there is nothing to tell apart");
   }
   Segmentation result;
-  result.pipeline = options.pipeline == Pipeline::kAuto ? choose_pipeline(image, look) : options.pipeline;
+  result.pipeline_given = options.pipeline != Pipeline::kAuto;
+  result.foreground_given = options.foreground != Foreground::kAuto;
+  const Choice choice = result.pipeline_given ? Choice{options.pipeline, "asked for"} : choose_pipeline(image, look);
+  result.pipeline = choice.pipeline;
+  result.pipeline_reason = choice.reason;
   result.foreground = options.foreground;
+  result.foreground_reason = "asked for";
   Steps steps(options, result.steps);
   steps.add("grey", "the channel that is analysed, as 8 bits", image);
   result.field_px = static_cast<std::int64_t>(image.values.size());
@@ -268,18 +309,31 @@ Result<Segmentation> segment(const GreyImage& image, const SegmentOptions& optio
     result.threshold = options.threshold.value_or(otsu(image));
     BinaryImage light = above(image, result.threshold);
     const std::int64_t light_px = count_above(light);
-    if (result.foreground == Foreground::kAuto)
+    if (!result.foreground_given) {
       result.foreground = 2 * light_px <= result.field_px ? Foreground::kLight : Foreground::kDark;
-    result.mask = result.foreground == Foreground::kLight ? std::move(light) : inverted(light);
+      result.foreground_reason = "chosen: the rarer of the two sides of the threshold is the ink";
+    }
+    const bool dark = result.foreground == Foreground::kDark;
+    result.mask = dark ? inverted(light) : std::move(light);
     steps.add("threshold", "the ink: what is measured, as it is", result.mask);
     const Pieces found = pieces_of(result.mask);
     result.area_min_px = 1;
     result.labels = renumbered(found.labels, 1, &result.areas_px);
+    sweep_levels(options, stop, result, [&](int level) {
+      Objects objects;
+      objects.mask = above(image, level);
+      if (dark) objects.mask = inverted(objects.mask);
+      objects.labels = renumbered(pieces_of(objects.mask).labels, 1, &objects.areas_px);
+      return objects;
+    });
   } else {
     if (result.pipeline == Pipeline::kPhase) {
       result.foreground = Foreground::kLight;
-    } else if (result.foreground == Foreground::kAuto) {
-      result.foreground = look.light - look.middle >= look.middle - look.dark ? Foreground::kLight : Foreground::kDark;
+      result.foreground_reason = "phase looks at texture, which is neither light nor dark";
+    } else if (!result.foreground_given) {
+      const bool is_dark = look.light - look.middle < look.middle - look.dark;
+      result.foreground = is_dark ? Foreground::kDark : Foreground::kLight;
+      result.foreground_reason = foreground_reason(look, is_dark);
     }
     const GreyImage signal = signal_of(image, options, result, steps);
     // Where a window is constant the picture was clipped or empty: such pixels say nothing about where noise ends and cells begin.
@@ -305,16 +359,7 @@ Result<Segmentation> segment(const GreyImage& image, const SegmentOptions& optio
     result.mask = std::move(objects.mask);
     result.labels = std::move(objects.labels);
     result.areas_px = std::move(objects.areas_px);
-    for (std::int64_t k = -kSweepSide; k <= kSweepSide; ++k) {
-      const std::int64_t at = level + k * kSweepStep;
-      if (at < 0 || at > 254) continue;
-      throw_if_stopped(stop);
-      const Objects other = k == 0 ? Objects{} : objects_at(signal, static_cast<int>(at), result.pipeline, options);
-      const std::vector<std::int64_t>& areas = k == 0 ? result.areas_px : other.areas_px;
-      std::int64_t sum = 0;
-      for (const std::int64_t area : areas) sum += area;
-      result.sweep.push_back({static_cast<int>(at), sum, static_cast<std::int64_t>(areas.size())});
-    }
+    sweep_levels(options, stop, result, [&](int at) { return objects_at(signal, at, result.pipeline, options); });
   }
   for (const std::int64_t area : result.areas_px) result.foreground_px += area;
   if (result.foreground_px == 0) {

@@ -1,4 +1,6 @@
 // segment: a grey picture of cells to numbered objects, every step kept as an image with its name, so that a person sees what was counted.
+// Choice:  who asks for nothing gets what the histogram says, and reads in `pipeline_reason` what it said and what else there is: an
+//          actin picture is a light thing on an empty ground too, but its objects are no nuclei, which no histogram knows.
 // Method:  nuclei: background by morphological opening, square root, Otsu, holes, parting by distance, small pieces away.
 //          phase: local standard deviation, Otsu on its logarithm, the window's reach taken back, small holes and pieces away.
 //          Both: a dish's wall (a thin piece around most of the picture) and what lies outside of it is left out.
@@ -10,6 +12,7 @@
 // Limits of validity: nuclei parts convex objects by their outline only, so nuclei on top of each other count once. phase finds regions of cells, not cells.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -32,6 +35,15 @@ struct StepImage {
   std::vector<std::uint8_t> values;
 };
 
+/// What one level of the sweep gives: the foreground before it is parted, and the objects.
+struct ThresholdView {
+  int threshold = 0;
+  Pipeline pipeline = Pipeline::kNuclei;  // never kAuto
+  const BinaryImage& mask;
+  const LabelImage& labels;
+};
+using ThresholdVisitor = std::function<void(const ThresholdView& view)>;
+
 struct SegmentOptions {
   Pipeline pipeline = Pipeline::kAuto;
   Foreground foreground = Foreground::kAuto;
@@ -46,6 +58,8 @@ struct SegmentOptions {
   bool split = true;   // nuclei: part touching objects
   bool keep_steps = true;
   std::string keep_only = {};  // keep only the step of this name; empty: all
+  bool sweep = true;           // nine levels: most of the time
+  ThresholdVisitor at_threshold = {};  // called for every level of the sweep, the answer's own first, then ascending
 };
 
 /// What one threshold gives; the sweep shows how much the answer hangs on it.
@@ -58,6 +72,8 @@ struct SweepPoint {
 struct Segmentation {
   Pipeline pipeline = Pipeline::kNuclei;       // what was done: never kAuto
   Foreground foreground = Foreground::kLight;  // never kAuto; of phase, which knows no sides, kLight
+  bool pipeline_given = false, foreground_given = false;
+  std::string pipeline_reason, foreground_reason;  // why these, in a sentence
   int threshold = 0;
   bool threshold_given = false;
   std::int64_t background_reach_px = 0;  // 0: not subtracted
@@ -68,7 +84,7 @@ struct Segmentation {
   LabelImage labels;
   std::vector<std::int64_t> areas_px;  // of label i + 1
   std::int64_t foreground_px = 0;      // sum of the areas
-  std::vector<SweepPoint> sweep;       // nine levels about the threshold, ascending
+  std::vector<SweepPoint> sweep;       // nine levels about the threshold, ascending; fewer at the ends of the scale
   std::vector<StepImage> steps;
 };
 

@@ -34,12 +34,6 @@ AnalysisOptions engine_options(const ImageOptions& options) {
   return out;
 }
 
-MeasuredLine measure(const BinaryImage& line, const BoxOptions& boxes, StopFlag stop) {
-  auto dimensions = box_dimensions(line, boxes, stop);
-  if (!dimensions) return {{}, dimensions.error().message};
-  return {std::move(*dimensions), {}};
-}
-
 void add_control(PictureMeasurement& out, const char* name, const Result<LabelImage>& control, const BoxOptions& boxes,
                  StopFlag stop) {
   if (control) {
@@ -60,15 +54,12 @@ Status measure_ink(PictureMeasurement& out, const BoxOptions& boxes, StopFlag st
   if (!outline) return outline.error();
   out.walls = ink;
   out.outline = *outline;
-  out.lines = {measure(ink, boxes, stop), measure(*outline, boxes, stop)};
+  out.lines = {measure_line(ink, boxes, stop), measure_line(*outline, boxes, stop)};
   out.reason = "drawn lines: their cells are known by the areas that the ink encloses, not by their shapes";
   const std::vector<LabelArea> areas = label_areas(out.cells);
   add_control(out, "hexagonal", hexagonal_control(areas), boxes, stop);
   add_control(out, "random_discs", random_disc_control(areas, kControlSeed), boxes, stop);
-  out.verdict.push_back("The ink itself was counted: lines thicker than one pixel raise the counts of the smallest boxes.");
-  if (out.lines.walls.dimensions && out.lines.walls.dimensions->crossover.found) {
-    out.verdict.push_back("The drawn lines: crossover, not scaling: the slope is no dimension.");
-  }
+  out.verdict.push_back("The ink itself was counted as cell walls: lines thicker than one pixel raise the counts of the smallest boxes.");
   return Ok{};
 }
 
@@ -89,7 +80,6 @@ Status measure_objects(PictureMeasurement& out, const BoxOptions& boxes, StopFla
   if (report) {
     out.lines = report->lines;
     out.controls = report->controls;
-    out.verdict = report->verdict;
     out.report = std::move(*report);
   } else {
     out.reason = report.error().message;
@@ -156,17 +146,27 @@ LabelImage enclosed_areas(const BinaryImage& ink, const BinaryImage& outside) {
   return labels;
 }
 
-Result<PictureMeasurement> measure_picture(std::string_view bytes, const ImageOptions& options, const Effort& effort) {
-  auto analysis = analyse_image(bytes, engine_options(options), effort.stop);
-  if (!analysis) return analysis.error();
-  PictureMeasurement out;
-  out.analysis = std::move(*analysis);
-  for (StepImage& step : out.analysis.segmentation.steps) step.values = {};  // only the names are told
+Result<PictureMeasurement> measure_picture(std::string_view bytes, const ImageOptions& options, const Effort& effort,
+                                           Sweep wanted_sweep) {
   BoxOptions boxes;
   boxes.threads = effort.threads;
+  ThresholdLines sweep(boxes, effort.stop);
+  AnalysisOptions wanted = engine_options(options);
+  wanted.segment.sweep = wanted_sweep == Sweep::kMake;
+  wanted.segment.at_threshold = [&sweep](const ThresholdView& view) { sweep.add(view); };
+  auto analysis = analyse_image(bytes, wanted, effort.stop);
+  if (!analysis) return analysis.error();
+  PictureMeasurement out;
+  out.sweep = sweep.finish();
+  out.analysis = std::move(*analysis);
+  for (StepImage& step : out.analysis.segmentation.steps) step.values = {};  // only the names are told
   const bool is_ink = out.analysis.segmentation.pipeline == Pipeline::kContours;
   const Status measured = is_ink ? measure_ink(out, boxes, effort.stop) : measure_objects(out, boxes, effort.stop);
   if (!measured) return measured.error();
+  out.findings = judge_lines(out.lines, out.controls);
+  for (const std::vector<std::string>& sentences : {sentences_of(out.findings), out.sweep.sentences}) {
+    out.verdict.insert(out.verdict.end(), sentences.begin(), sentences.end());
+  }
   std::uint64_t covered_px = 0;
   const std::vector<LabelArea> areas = label_areas(out.cells);
   for (const LabelArea& area : areas) covered_px += area.area_px;
@@ -189,9 +189,9 @@ Json encode_picture_result(const PictureMeasurement& measurement) {
   Json measurements = nullptr;
   if (measurement.report) {
     measurements = encode_report(*measurement.report);
-    for (const char* name : {"verdict", "fractal", "controls"}) measurements.erase(name);
+    for (const char* name : {"verdict", "findings", "fractal", "controls"}) measurements.erase(name);
   }
-  return {{"image", encode_metadata(measurement.analysis.metadata)},
+  return {{"image", encode_metadata(measurement.analysis)},
           {"segmentation", encode_segmentation(measurement.analysis)},
           {"steps", std::move(steps)},
           {"verdict", measurement.verdict},
@@ -200,14 +200,32 @@ Json encode_picture_result(const PictureMeasurement& measurement) {
           {"fractal",
            {{"walls", encode_line(measurement.lines.walls)}, {"outline", encode_line(measurement.lines.outline)}}},
           {"controls", std::move(controls)},
+          {"findings", encode_findings(measurement.findings)},
+          {"threshold_sweep", encode_threshold_sweep(measurement.sweep)},
           {"measurements", std::move(measurements)},
           {"reason", measurement.reason.empty() ? Json(nullptr) : Json(measurement.reason)}};
+}
+
+Result<LabelImage> objects_of_picture(std::string_view bytes, const ImageOptions& options, const Effort& effort) {
+  AnalysisOptions wanted = engine_options(options);
+  wanted.segment.keep_steps = wanted.segment.sweep = false;
+  auto analysis = analyse_image(bytes, wanted, effort.stop);
+  if (!analysis) return analysis.error();
+  LabelImage objects = std::move(analysis->segmentation.labels);
+  if (analysis->segmentation.pipeline == Pipeline::kContours) {
+    const auto outside = outside_of(analysis->segmentation.mask);
+    if (!outside) return outside.error();
+    objects = enclosed_areas(analysis->segmentation.mask, *outside);
+  }
+  objects.um_per_px = analysis->um_per_px;
+  return objects;
 }
 
 Result<std::string> step_png(std::string_view bytes, const ImageOptions& options, const std::string& name,
                              const Effort& effort) {
   AnalysisOptions wanted = engine_options(options);
   wanted.segment.keep_only = name;
+  wanted.segment.sweep = false;
   const auto analysis = analyse_image(bytes, wanted, effort.stop);
   if (!analysis) return analysis.error();
   for (const StepImage& step : analysis->segmentation.steps) {

@@ -9,6 +9,7 @@
 
 #include "engine/analysis/image_analysis.hpp"
 #include "engine/analysis/report.hpp"
+#include "engine/analysis/threshold_sweep.hpp"
 #include "engine/picture/parallel.hpp"
 #include "server/api/json.hpp"
 
@@ -36,6 +37,8 @@ struct PictureMeasurement {
   BinaryImage outline;
   LineReport lines;
   std::vector<ControlReport> controls;
+  LineFindings findings;
+  ThresholdSweep sweep;
   std::optional<LabelReport> report;  // none for ink, or where `reason` says why
   std::string reason;
   std::vector<std::string> verdict;
@@ -43,8 +46,13 @@ struct PictureMeasurement {
   double cell_area_mean_px = 0.0;     // 0 without cells
 };
 
-Result<PictureMeasurement> measure_picture(std::string_view bytes, const ImageOptions& options, const Effort& effort);
+enum class Sweep { kMake, kLeaveOut };  // eight more segmentations and twice as many countings
+Result<PictureMeasurement> measure_picture(std::string_view bytes, const ImageOptions& options, const Effort& effort,
+                                           Sweep sweep = Sweep::kMake);
 Json encode_picture_result(const PictureMeasurement& measurement);
+
+/// The objects of a picture, as label image: what a table of them is made from. Neither lines nor sweep are counted.
+Result<LabelImage> objects_of_picture(std::string_view bytes, const ImageOptions& options, const Effort& effort);
 
 /// One step as PNG; kNotFound with the names there are.
 Result<std::string> step_png(std::string_view bytes, const ImageOptions& options, const std::string& name,

@@ -16,6 +16,7 @@ Effort effort_of(const Context& context);
 /// Stores, nudges the worker if there is something left to do, and answers 201 or 202.
 http::Response created(Context& context, const Call& call, const NewAnalysis& analysis);
 http::Response listed(Context& context, const Call& call, AnalysisKind kind);
+http::Response csv_response(std::string text);
 http::Response removed(Context& context, const Call& call, AnalysisKind kind);
 
 }  // namespace colony::server::api

@@ -45,9 +45,12 @@ inline constexpr std::size_t kEventsPerPageDefault = 1000;
 inline constexpr std::size_t kSeriesPointsMax = 10'000;
 inline constexpr std::size_t kSeriesPointsDefault = 200;
 inline constexpr std::size_t kIdempotencyKeyBytesMax = 200;
-/// A picture is held in memory as its file: at most some 200 MB.
 /// Up to here a picture is analysed before the answer, beyond by the worker.
 inline constexpr std::int64_t kAnalysedAtOncePixelsMax = 4'000'000;
+/// The same of a colony in a comparison, by an estimate that may be half as much again too low; and cells.
+inline constexpr std::int64_t kComparedAtOncePixelsMax = 2'500'000;
+inline constexpr std::size_t kComparedAtOnceCellsMax = 20'000;
+/// A picture is held in memory as its file: at most some 200 MB.
 inline constexpr std::int64_t kServedPictureSideMax_px = 8192;
 inline constexpr std::uint64_t kMeshTrianglesDefault = 200'000;
 inline constexpr std::int64_t kServedMeshTrianglesMax = 4'000'000;  // 50 bytes each, and the file once more
@@ -146,6 +149,7 @@ http::Response post_analysis(Context& context, const Call& call);
 http::Response get_analyses(Context& context, const Call& call);
 http::Response get_analysis(Context& context, const Call& call);
 http::Response delete_analysis(Context& context, const Call& call);
+http::Response get_analysis_objects(Context& context, const Call& call);
 http::Response get_analysis_step(Context& context, const Call& call);
 http::Response post_comparison(Context& context, const Call& call);
 http::Response get_comparisons(Context& context, const Call& call);

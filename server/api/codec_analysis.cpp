@@ -53,6 +53,8 @@ Json picture_result() {
                      {"cell_count", typed("integer")},
                      {"cell_area_mean_px", typed("number")}};
   properties.update(fractal_properties());
+  properties["findings"] = reference("Findings");
+  properties["threshold_sweep"] = reference("ThresholdSweep");
   properties["measurements"] = or_null(reference("Shapes"));
   properties["reason"] = nullable("string");
   return strict_object(std::move(properties));
@@ -61,18 +63,21 @@ Json picture_result() {
 Json comparison_result() {
   Json side = {{"um_per_px", nullable("number")}, {"cell_count", typed("integer")}, {"cell_area_mean_px", typed("number")}};
   side.update(fractal_properties());
+  side["findings"] = reference("Findings");
   const Json difference = or_null(strict_object({{"simulated", typed("number")},
                                                  {"real", typed("number")},
                                                  {"difference", typed("number")},
                                                  {"se", typed("number")},
                                                  {"differs", typed("boolean")}}));
+  Json real = side;
+  real["threshold_sweep"] = reference("ThresholdSweep");
   return strict_object({{"time_h", typed("number")},
                         {"last_seq", typed("integer")},
                         {"digest", typed("string")},
                         {"verdict", list(typed("string"))},
                         {"differences", strict_object({{"walls", difference}, {"outline", difference}})},
                         {"simulated", strict_object(side)},
-                        {"real", strict_object(side)}});
+                        {"real", strict_object(std::move(real))}});
 }
 
 Json page_of(std::string_view component) {
@@ -144,6 +149,7 @@ Json encode_analysis(const AnalysisRow& row, bool with_result) {
     out["links"]["figure"] = self + "/figure";
   } else {
     out["links"]["steps"] = self + "/steps";
+    out["links"]["objects"] = self + "/objects";
   }
   return out;
 }
@@ -158,7 +164,7 @@ Json analysis_components() {
                                        {"foreground", one_of({"auto", "light", "dark"})},
                                        {"threshold", nullable("integer")},
                                        {"clahe", typed("boolean")}});
-  analysis["links"] = links({"self", "steps"});
+  analysis["links"] = links({"self", "steps", "objects"});
   Json comparison = common_properties("comparison");
   comparison["job_id"] = comparison["analysis_id"] = typed("string");
   comparison["options"] = strict_object({{"at_h", typed("number")}});

@@ -150,6 +150,38 @@ Json encode_line(const MeasuredLine& line) {
           {"reason", nullptr}};
 }
 
+Json encode_findings(const LineFindings& findings) {
+  const auto one = [](const LineFinding& line) -> Json {
+    if (line.finding == Finding::kNoFigures) {
+      return {{"finding", name_of(line.finding)}, {"decades", nullptr},         {"plateau_decades", nullptr},
+              {"slope_small_boxes", nullptr},     {"slope_large_boxes", nullptr}, {"like_controls", Json::array()},
+              {"unlike_controls", Json::array()}};
+    }
+    return {{"finding", name_of(line.finding)},
+            {"decades", line.slopes.decades},
+            {"plateau_decades", line.slopes.plateau_decades},
+            {"slope_small_boxes", line.slopes.first},
+            {"slope_large_boxes", line.slopes.last},
+            {"like_controls", line.like_controls},
+            {"unlike_controls", line.unlike_controls}};
+  };
+  return {{"walls", one(findings.walls)}, {"outline", one(findings.outline)}};
+}
+
+Json encode_threshold_sweep(const ThresholdSweep& sweep) {
+  const auto line = [](const MeasuredLine& measured) -> Json {
+    if (!measured.dimensions) return {{"d0", nullptr}, {"crossover", nullptr}, {"reason", measured.reason}};
+    return {{"d0", encode_dimension(measured.dimensions->capacity, *measured.dimensions)},
+            {"crossover", measured.dimensions->crossover.found},
+            {"reason", nullptr}};
+  };
+  Json rows = Json::array();
+  for (const ThresholdRow& row : sweep.rows) {
+    rows.push_back({{"threshold", row.threshold}, {"walls", line(row.walls)}, {"outline", line(row.outline)}});
+  }
+  return {{"sides_px", sweep.sides_px}, {"rows", std::move(rows)}};
+}
+
 Json encode_report(const LabelReport& report) {
   Json controls = Json::array();
   for (const ControlReport& control : report.controls) {
@@ -162,6 +194,7 @@ Json encode_report(const LabelReport& report) {
           {"cell_area_mean_px", report.cell_area_mean_px},
           {"px_per_cell_diameter", report.px_per_cell_diameter},
           {"verdict", report.verdict},
+          {"findings", encode_findings(report.findings)},
           {"fractal", {{"walls", encode_line(report.lines.walls)}, {"outline", encode_line(report.lines.outline)}}},
           {"controls", std::move(controls)},
           {"colony", encode_colony(report.colony, report.um_per_px)},
@@ -203,7 +236,9 @@ Json encode_growth(const Result<GrowthPhases>& growth) {
           {"reason", nullptr}};
 }
 
-Json encode_metadata(const ImageMetadata& metadata) {
+Json encode_metadata(const ImageAnalysis& analysis) {
+  const ImageMetadata& metadata = analysis.metadata;
+  constexpr const char* kSources[] = {"none", "given", "ome"};
   constexpr const char* kModels[] = {"grey", "rgb", "channels"};
   return {{"media_type", media_type(metadata.format)},
           {"colour_model", kModels[static_cast<int>(metadata.model)]},
@@ -211,6 +246,8 @@ Json encode_metadata(const ImageMetadata& metadata) {
           {"height_px", metadata.height_px},
           {"channel_count", metadata.channel_count},
           {"bits", metadata.bits},
+          {"um_per_px", or_null(analysis.um_per_px)},
+          {"um_per_px_source", kSources[static_cast<int>(metadata.scale_source)]},
           {"um_per_px_stated", or_null(metadata.um_per_px_stated)},
           {"channel", or_null(metadata.channel)},
           {"level_low", metadata.level_low},
@@ -229,7 +266,11 @@ Json encode_segmentation(const ImageAnalysis& analysis) {
                      {"object_count", point.object_count}});
   }
   return {{"pipeline", kPipelines[static_cast<int>(found.pipeline)]},
+          {"pipeline_given", found.pipeline_given},
+          {"pipeline_reason", found.pipeline_reason},
           {"foreground", kForegrounds[static_cast<int>(found.foreground)]},
+          {"foreground_given", found.foreground_given},
+          {"foreground_reason", found.foreground_reason},
           {"threshold", found.threshold},
           {"threshold_given", found.threshold_given},
           {"background_reach_px", found.background_reach_px},

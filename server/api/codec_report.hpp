@@ -7,6 +7,7 @@
 #include "engine/analysis/image_analysis.hpp"
 #include "engine/analysis/packing.hpp"
 #include "engine/analysis/report.hpp"
+#include "engine/analysis/threshold_sweep.hpp"
 #include "server/api/json.hpp"
 
 namespace colony::server::api {
@@ -16,7 +17,10 @@ Json encode_line(const MeasuredLine& line);
 Json encode_report(const LabelReport& report);
 Json encode_packing(const Result<PackingStatistics>& packing);
 Json encode_growth(const Result<GrowthPhases>& growth);
-Json encode_metadata(const ImageMetadata& metadata);
+Json encode_findings(const LineFindings& findings);
+Json encode_threshold_sweep(const ThresholdSweep& sweep);
+/// What the file was, and where the scale came from.
+Json encode_metadata(const ImageAnalysis& analysis);
 Json encode_segmentation(const ImageAnalysis& analysis);
 
 /// Schemas of the above, by component name.

@@ -18,8 +18,13 @@ struct Comparison {
   PictureMeasurement real;
 };
 
-Result<Comparison> compare(ColonyAt at, std::string_view picture, const ImageOptions& options, const Effort& effort);
+Result<Comparison> compare(ColonyAt at, std::string_view picture, const ImageOptions& options, const Effort& effort,
+                           Sweep sweep = Sweep::kMake);
 Json encode_comparison(const Comparison& comparison);
+
+/// How many pixels the colony will take at the matched scale, from its cells' smooth ellipses without their overlaps and without drawing
+/// anything: too low where cells hide each other, by a third in a confluent layer.
+std::int64_t compared_px_estimate(const Colony& colony, double cell_area_px);
 
 /// The scale at which `cell_area_px` is the mean visible area of a cell, um per pixel.
 Result<double> matched_scale(const Colony& colony, double cell_area_px, const Effort& effort);

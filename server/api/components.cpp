@@ -7,6 +7,7 @@
 #include "server/api/codec_report.hpp"
 #include "server/api/problems.hpp"
 #include "server/api/schema.hpp"
+#include "server/api/shape_table.hpp"
 
 namespace colony::server::api {
 namespace {
@@ -244,6 +245,8 @@ Json component_schemas(const SpecLimits& limits) {
       {"Event", event_union()},
       {"EventList", page_of("Event", {{"type", Json::array({"string", "null"})}, {"pattern", "^[0-9]+$"}})},
       {"SeriesRow", row_schema(series_columns())},
+      {"ObjectShape", row_schema(object_shape_columns())},
+      {"ObjectList", page_of("ObjectShape", typed("null"))},
       {"Series", page_of("SeriesRow", typed("null"))},
       {"LogLine", strict_object({{"index", count()},
                                  {"at", wall_time(false)},

@@ -5,6 +5,8 @@
 #include "server/api/analysis_work.hpp"
 #include "server/api/api.hpp"
 #include "server/api/codec_analysis.hpp"
+#include "server/api/codec_event.hpp"
+#include "server/api/shape_table.hpp"
 
 namespace colony::server::api {
 namespace {
@@ -134,6 +136,22 @@ http::Response get_analysis(Context& context, const Call& call) {
 }
 http::Response delete_analysis(Context& context, const Call& call) {
   return removed(context, call, AnalysisKind::kAnalysis);
+}
+
+http::Response get_analysis_objects(Context& context, const Call& call) {
+  AnalysisStore& store = context.jobs.store().analyses();
+  const auto row = store.find(AnalysisKind::kAnalysis, call.id());
+  if (!row) return failure(row.error(), call);
+  const auto image = store.image(call.id());
+  if (!image) return failure(image.error(), call);
+  const auto objects = objects_of_picture(*image, decode_image_options(row->options_json), effort_of(context));
+  if (!objects) return failure(as_body_error(objects.error()), call);
+  const auto rows = shape_rows(*objects);
+  if (!rows) return failure(as_body_error(rows.error()), call);
+  if (call.media == "text/csv") return csv_response(shape_csv(object_shape_columns(), *rows));
+  Json items = Json::array();
+  for (const ShapeRow& object : *rows) items.push_back(encode_row(object_shape_columns(), object));
+  return json_response(200, {{"items", std::move(items)}, {"next", nullptr}});
 }
 
 http::Response get_analysis_step(Context& context, const Call& call) {

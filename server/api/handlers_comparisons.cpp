@@ -28,12 +28,13 @@ Error gone_with(const char* pointer, Error error) {
   return error;
 }
 
-Result<Comparison> compare_again(Context& context, const AnalysisRow& row, const Effort& effort) {
+Result<Comparison> compare_again(Context& context, const AnalysisRow& row, const Effort& effort, Sweep sweep) {
   auto found = source_of(context, row.analysis_id);
   if (!found) return found.error();
   auto at = context.jobs.colony_at(row.job_id, Json::parse(row.options_json)["at_h"].get<double>());
   if (!at) return at.error();
-  return compare(std::move(*at), found->image, decode_image_options(found->row.options_json), effort);
+  return compare(std::move(*at), found->image, decode_image_options(found->row.options_json), effort,
+                 sweep);
 }
 
 }  // namespace
@@ -44,7 +45,7 @@ AnalysisWorker::Outcome work_on(Context& context, const AnalysisRow& row, StopFl
     return AnalysisWorker::Outcome{{}, std::string(problem_row(problem_kind_of(error.code)).code), error.message};
   };
   if (row.kind == AnalysisKind::kComparison) {
-    const auto comparison = compare_again(context, row, effort);
+    const auto comparison = compare_again(context, row, effort, Sweep::kMake);
     if (!comparison) return failed(comparison.error());
     return {to_text(encode_comparison(*comparison)), {}, {}};
   }
@@ -82,7 +83,10 @@ http::Response post_comparison(Context& context, const Call& call) {
   const Json stored = Json::parse(source->row.result_json);
   const Json& image = stored["image"];
   const std::int64_t pixels = image["width_px"].get<std::int64_t>() * image["height_px"].get<std::int64_t>();
-  if (pixels <= kAnalysedAtOncePixelsMax) {
+  // Either may be the large one: a small picture of large cells asks for a large picture of the colony.
+  const bool is_small = pixels <= kAnalysedAtOncePixelsMax && at->colony->cells().size() <= kComparedAtOnceCellsMax &&
+                        compared_px_estimate(*at->colony, stored["cell_area_mean_px"].get<double>()) <= kComparedAtOncePixelsMax;
+  if (is_small) {
     const auto made = compare(std::move(*at), source->image, decode_image_options(source->row.options_json),
                               effort_of(context));
     if (!made) return failure(made.error(), call);
@@ -105,7 +109,7 @@ http::Response delete_comparison(Context& context, const Call& call) {
 http::Response get_comparison_figure(Context& context, const Call& call) {
   const auto row = context.jobs.store().analyses().find(AnalysisKind::kComparison, call.id());
   if (!row) return failure(row.error(), call);
-  const auto comparison = compare_again(context, *row, effort_of(context));
+  const auto comparison = compare_again(context, *row, effort_of(context), Sweep::kLeaveOut);
   if (!comparison) return failure(comparison.error(), call);
   http::Response response;
   response.headers.set("Content-Type", call.media);

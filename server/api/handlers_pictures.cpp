@@ -10,6 +10,7 @@
 #include "server/api/codec_report.hpp"
 #include "server/api/glb.hpp"
 #include "server/api/measure.hpp"
+#include "server/api/shape_table.hpp"
 
 namespace colony::server::api {
 namespace {
@@ -49,6 +50,8 @@ Result<GrowthPhases> growth_until(Context& context, const Call& call, double tim
 }
 
 }  // namespace
+
+http::Response csv_response(std::string text) { return bytes_response("text/csv; charset=utf-8; header=present", std::move(text)); }
 
 http::Response get_image(Context& context, const Call& call) {
   PictureSpec spec;
@@ -105,6 +108,10 @@ http::Response get_analysis_of_job(Context& context, const Call& call) {
   const Effort effort = effort_of(context);
   const auto image = label_colony(*at->colony, spec, effort);
   if (!image) return failure(image.error(), call);
+  if (call.media == "text/csv") {
+    const auto rows = shape_rows(image->labels, *at->colony, image->left_um, image->top_um);
+    return rows ? csv_response(shape_csv(cell_shape_columns(), *rows)) : failure(rows.error(), call);
+  }
   const auto report = measure_colony(*at, *image, effort);
   if (!report) return failure(report.error(), call);
   const auto packing = packing_statistics(*at->colony, at->spec->params.contact.rule, at->spec->seed,

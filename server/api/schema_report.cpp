@@ -42,6 +42,28 @@ Json line_schema() {
        {"reason", described({{"type", Json::array({"string", "null"})}}, "why there are no figures")}});
 }
 
+Json findings_schema() {
+  Json line = Json::object();
+  for (const char* name : {"decades", "plateau_decades", "slope_small_boxes", "slope_large_boxes"}) line[name] = nullable_number();
+  line["finding"] = {{"enum", {"no_figures", "crossover", "short_range", "wandering", "scaling"}},
+                     {"description", "scaling: a power law fits over a decade and three quarters of the range or more; no other is a dimension, and this one proves no fractal"}};
+  line["decades"]["description"] = "of box sides counted";
+  line["plateau_decades"]["description"] = "longest range over which the local slopes are alike";
+  line["like_controls"] = described(texts(), "controls with the same D0 within errors and bias: the value says nothing that they do not");
+  line["unlike_controls"] = texts();
+  const Json one = strict_object(std::move(line));
+  return strict_object({{"walls", one}, {"outline", one}});
+}
+
+Json threshold_sweep_schema() {
+  const Json line = strict_object({{"d0", or_null(reference("Dimension"))},
+                                   {"crossover", {{"type", Json::array({"boolean", "null"})}}},
+                                   {"reason", {{"type", Json::array({"string", "null"})}}}});
+  Json schema = strict_object({{"sides_px", list(count())},
+                               {"rows", list(strict_object({{"threshold", count()}, {"walls", line}, {"outline", line}}))}});
+  return described(std::move(schema), "the same lines at other thresholds, with the same boxes: what hangs on the threshold is the threshold's");
+}
+
 Json colony_schema() {
   Json properties = numbers({"perimeter_px", "circularity", "solidity", "eccentricity", "open_share", "radius_mean_px",
                              "radius_rms_px", "roughness", "excess_perimeter"});
@@ -87,6 +109,7 @@ Json report_properties() {
           {"cell_area_mean_px", number()},
           {"px_per_cell_diameter", number()},
           {"verdict", described(texts(), "what follows from the figures, and what does not")},
+          {"findings", reference("Findings")},
           {"fractal", strict_object(lines)},
           {"controls", list(strict_object(std::move(control)))},
           {"colony", colony_schema()},
@@ -134,7 +157,10 @@ Json metadata_schema() {
                         {"height_px", count()},
                         {"channel_count", count()},
                         {"bits", count()},
-                        {"um_per_px_stated", described(nullable_number(), "by the file; never used unasked")},
+                        {"um_per_px", described(nullable_number(), "the scale that was used")},
+                        {"um_per_px_source", {{"enum", {"none", "given", "ome"}},
+                                              {"description", "given: by the query; ome: by the file's OME metadata; a contradiction is in notes"}}},
+                        {"um_per_px_stated", described(nullable_number(), "by the file; used only where OME metadata says it and nothing contradicts it")},
                         {"channel", {{"type", Json::array({"integer", "null"})}}},
                         {"level_low", count()},
                         {"level_high", count()},
@@ -149,7 +175,9 @@ Json segmentation_schema() {
   }
   properties["pipeline"] = {{"enum", {"nuclei", "phase", "contours"}}};
   properties["foreground"] = {{"enum", {"light", "dark"}}};
-  properties["threshold_given"] = properties["dish_found"] = boolean();
+  for (const char* name : {"pipeline_given", "foreground_given", "threshold_given", "dish_found"}) properties[name] = boolean();
+  properties["pipeline_reason"] = described(text(), "why this pipeline, and which one else there is");
+  properties["foreground_reason"] = text();
   for (const char* name : {"area_mean_um2", "foreground_um2", "density_per_mm2"}) properties[name] = nullable_number();
   properties["sweep"] =
       list(strict_object({{"threshold", count()}, {"foreground_px", count()}, {"object_count", count()}}));
@@ -164,7 +192,7 @@ Json report_components() {
   job["packing"] = packing_schema();
   job["growth"] = growth_schema();
   Json shapes = report_properties();
-  for (const char* name : {"verdict", "fractal", "controls"}) shapes.erase(name);
+  for (const char* name : {"verdict", "findings", "fractal", "controls"}) shapes.erase(name);
   return {{"Shapes", strict_object(std::move(shapes))},
           {"Dimension",
            strict_object({{"value", number()},
@@ -172,6 +200,8 @@ Json report_components() {
                           {"r2", number()},
                           {"range_px", {{"type", "array"}, {"items", count()}, {"minItems", 2}, {"maxItems", 2}}}})},
           {"MeasuredLine", line_schema()},
+          {"Findings", findings_schema()},
+          {"ThresholdSweep", threshold_sweep_schema()},
           {"Report", strict_object(report_properties())},
           {"JobAnalysis", strict_object(std::move(job))},
           {"ImageMetadata", metadata_schema()},

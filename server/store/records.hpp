@@ -69,7 +69,7 @@ struct LogRow {
   std::string at;                          // RFC 3339 UTC
   std::string level;                       // "info", "warning", "error"
   std::string message;
-  std::string actor;                       // who asked for it (name of a token, or "local"); empty: the service itself
+  std::string actor = {};                       // who asked for it (name of a token, or "local"); empty: the service itself
 };
 
 }  // namespace colony::server

@@ -1,5 +1,5 @@
 // colony-evidence: prints the tables of engine/DESIGN.md, "Evidence".
-// Usage:  colony-evidence [--full] [volume|searches|colonies|contact|reference ...]     no name: all
+// Usage:  colony-evidence [--full] [volume|searches|colonies|contact|reference|figure2 ...]     no name: all
 #include "tests/bench/evidence.hpp"
 
 #include <string_view>
@@ -16,7 +16,8 @@ constexpr Table kTables[] = {{"volume", print_volume_error},
                              {"searches", print_searches},
                              {"colonies", print_colony_terms},
                              {"contact", print_contact},
-                             {"reference", print_reference}};
+                             {"reference", print_reference},
+                             {"figure2", print_figure2}};
 
 }  // namespace
 
@@ -32,7 +33,7 @@ int main(int argc, char** argv) {
     const Table* found = nullptr;
     for (const Table& table : kTables) found = table.name == argument ? &table : found;
     if (found == nullptr) {
-      std::fprintf(stderr, "usage: colony-evidence [--full] [volume|searches|colonies|contact|reference ...]\n");
+      std::fprintf(stderr, "usage: colony-evidence [--full] [volume|searches|colonies|contact|reference|figure2 ...]\n");
       return argument == "--help" ? 0 : 2;
     }
     wanted.push_back(found);

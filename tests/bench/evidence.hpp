@@ -46,5 +46,6 @@ void print_searches(const EvidenceSize& size);      // b to f, j: on real attemp
 void print_colony_terms(const EvidenceSize& size);  // c, d, f, h, j: what they earn a colony
 void print_contact(const EvidenceSize& size);       // g, i
 void print_reference(const EvidenceSize& size);     // k
+void print_figure2(const EvidenceSize& size);       // l: also of photographs, where COLONY_DATA names a folder of them
 
 }  // namespace colony::bench

@@ -1,5 +1,6 @@
 // colony-picture-bench: grows one colony and times what engine/picture makes of it; each figure stands beside the hash
 // of the answer.
+//         Last: box counting of cell walls, 4,000 x 4,000 px, 64 offsets, 20 sides, whatever the other options.
 // Usage:  colony-picture-bench [--cells N] [--width PX] [--threads T] [--triangles N] [--out DIR]
 //         With --out the pictures, the OME-TIFF and the mesh (Wavefront OBJ) are written there, to be looked at.
 #include <algorithm>
@@ -17,6 +18,9 @@
 
 #include <Eigen/Geometry>
 
+#include "engine/analysis/contour.hpp"
+#include "engine/analysis/controls.hpp"
+#include "engine/analysis/scaling.hpp"
 #include "engine/picture/mesh.hpp"
 #include "engine/picture/ome_tiff.hpp"
 #include "engine/picture/paths.hpp"
@@ -108,6 +112,38 @@ std::string wavefront(const Mesh& mesh) {
   return text;
 }
 
+/// Discs in hexagonal packing: the walls of a dense layer, as many lines as such a picture has.
+BinaryImage walls_of_discs(std::int64_t side_px) {
+  std::vector<LabelArea> areas;
+  for (std::uint32_t label = 1; label <= 4096; ++label) areas.push_back({label, 2000});
+  const LabelImage discs = *hexagonal_control(areas);
+  LabelImage part(side_px, side_px);
+  for (std::int64_t row = 0; row < std::min(side_px, discs.height_px); ++row) {
+    for (std::int64_t column = 0; column < std::min(side_px, discs.width_px); ++column) {
+      part.at(row, column) = discs.at(std::int64_t{row}, std::int64_t{column});
+    }
+  }
+  return *cell_walls(part);
+}
+
+void count_boxes_timed(const Options& options) {
+  const BinaryImage walls = walls_of_discs(4000);
+  BoxOptions boxes;
+  boxes.threads = options.threads;
+  boxes.sides_px = geometric_sides(4000, boxes);
+  while (boxes.sides_px.size() > 20) boxes.sides_px.pop_back();
+  BoxDimensions found;
+  timed("box_counting", options, [&] {
+    found = *box_dimensions(walls, boxes);
+    std::string bytes;
+    for (const BoxCount& count : found.counts) bytes += bytes_of(&count.count_mean, sizeof count.count_mean);
+    return bytes;
+  });
+  std::printf("box counting: %zu sides of %d to %d px, %d offsets, %llu px of lines, D0 %.3f\n", found.counts.size(), static_cast<int>(found.side_min_px),
+              static_cast<int>(found.side_max_px), static_cast<int>(found.counts.back().offset_count),
+              static_cast<unsigned long long>(found.foreground_px), found.capacity.value);
+}
+
 void run(const Options& options) {
   const Simulator simulator = grown(options);
   const Colony& colony = simulator.colony();
@@ -157,6 +193,7 @@ void run(const Options& options) {
   std::printf("mesh: volume %.0f um3, by path lengths %.0f um3, ratio %.4f\n", volume_um3(mesh), sum_um3,
               volume_um3(mesh) / sum_um3);
   if (!options.out.empty()) keep(options, "colony.obj", wavefront(mesh));
+  count_boxes_timed(options);
 }
 
 }  // namespace

@@ -92,6 +92,7 @@ struct TiffSpec {
   int alpha = -1;  // EXTRASAMPLE_...; -1: the further channels are unspecified
   float per_centimetre = 0.0F;
   std::string description = {};
+  bool centimetres = false;  // the resolution's unit also where there is a description
 };
 
 namespace tiff_memory {
@@ -159,7 +160,7 @@ inline std::string tiff_file(const std::vector<Picture16>& pages, const TiffSpec
     if (spec.per_centimetre > 0.0F) {
       TIFFSetField(tiff, TIFFTAG_XRESOLUTION, spec.per_centimetre);
       TIFFSetField(tiff, TIFFTAG_YRESOLUTION, spec.per_centimetre);
-      TIFFSetField(tiff, TIFFTAG_RESOLUTIONUNIT, spec.description.empty() ? RESUNIT_CENTIMETER : RESUNIT_NONE);
+      TIFFSetField(tiff, TIFFTAG_RESOLUTIONUNIT, spec.description.empty() || spec.centimetres ? RESUNIT_CENTIMETER : RESUNIT_NONE);
     }
     if (!spec.description.empty()) TIFFSetField(tiff, TIFFTAG_IMAGEDESCRIPTION, spec.description.c_str());
     const int planes = spec.planar ? page.channels : 1, block_channels = spec.planar ? 1 : page.channels;

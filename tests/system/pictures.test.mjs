@@ -89,6 +89,10 @@ test('a job is seen, measured and compared', async (t) => {
     assert.deepEqual(json.controls.map(({ name }) => name), ['without_noise', 'hexagonal', 'random_discs']);
     assert.ok(json.verdict.length > 0);
     assert.deepEqual((await server.get(`${base}/analysis`)).json, json, 'asked twice, the same to the last digit');
+    assert.match(json.verdict.join(' '), /What follows for the cell walls/);
+    const table = (await server.get(`${base}/analysis`, { Accept: 'text/csv' })).text.trim().split('\r\n');
+    assert.equal(table.length, 25, 'a line a cell and the head');
+    assert.match(table[0], /^cell_id,area_px,area_um2,/);
   });
 
   await t.test('against a picture, pixels per cell matched', async () => {
@@ -119,11 +123,17 @@ test('a job is seen, measured and compared', async (t) => {
     const analyzed = await colony(server, ['analyze', picture, '--pipeline', 'nuclei', '--steps', join(folder, 'steps')]);
     assert.equal(analyzed.code, 0, analyzed.err);
     assert.match(analyzed.out, /36 objects/);
+    assert.match(analyzed.out, /pipeline nuclei, asked for/);
+    assert.match(analyzed.out, /threshold \d+: walls \d/);
     const id = /analysis (\S+)/.exec(analyzed.out)[1];
     const compared = await colony(server, ['compare', job.id, id, '--figure', join(folder, 'figure.png')]);
     assert.equal(compared.code, 0, compared.err);
     assert.ok(pngFacts(readFileSync(join(folder, 'figure.png'))).height > 1000);
     assert.equal((await colony(server, ['measure', job.id])).code, 0);
+    const objects = join(folder, 'objects.csv'), sheet = join(folder, 'analysis.html');
+    assert.equal((await colony(server, ['analyze', picture, '--objects', objects, '--html', sheet])).code, 0);
+    assert.equal(readFileSync(objects, 'utf8').trim().split('\r\n').length, 37);
+    assert.match(readFileSync(sheet, 'utf8'), /Against the threshold/);
     assert.match((await colony(server, ['lineage', job.id])).out, /;\n$/);
     assert.equal((await colony(server, ['mesh', job.id, '-o', join(folder, 'm.glb')])).code, 0);
     const text = join(folder, 'text.png');

@@ -9,6 +9,7 @@
 
 #include "server/api/analyse.hpp"
 #include "server/api/compare.hpp"
+#include "server/api/shape_table.hpp"
 #include "tests/support/image_files.hpp"
 #include "tests/unit/api_support.hpp"
 
@@ -79,9 +80,56 @@ TEST(JobAnalysis, HasItsControlsBesideIt) {
   EXPECT_EQ(d0["range_px"].size(), 2u);
   EXPECT_FALSE(json["verdict"].empty());
   EXPECT_TRUE(json["packing"]["reason"].is_null());
+  EXPECT_EQ(json["findings"]["walls"]["finding"], "crossover");
+  EXPECT_THAT(json["verdict"][0].get<std::string>(), HasSubstr("a crossover, not scaling"));
   // A scale that is twice as fine has four times the pixels in the same cells.
   auto finer = fixture.get(kJob + "/analysis?width_px=1024");
   EXPECT_NEAR(json_of(finer)["cell_area_mean_px"].get<double>() / json["cell_area_mean_px"].get<double>(), 4.0, 0.04);
+}
+
+TEST(JobAnalysis, AsCsvIsALineACell) {
+  ApiFixture fixture;
+  auto response = fixture.get(kJob + "/analysis?width_px=512", {{"Accept", "text/csv"}});
+  ASSERT_EQ(response.status, 200) << response.body;
+  EXPECT_THAT(header(response, "Content-Type"), StartsWith("text/csv"));
+  const auto lines = split_lines(response.body, "\r\n");
+  ASSERT_EQ(lines.size(), 7u);  // six cells
+  EXPECT_EQ(lines[0],
+            "cell_id,area_px,area_um2,perimeter_px,perimeter_um,circularity,solidity,eccentricity,neighbour_count,is_interior,at_frame,"
+            "centre_x_px,centre_y_px,centre_x_um,centre_y_um");
+  // The table and the summary are of one image; the place is that of the dish.
+  auto summary = fixture.get(kJob + "/analysis?width_px=512");
+  const Json json = json_of(summary);
+  double area_px = 0.0;
+  for (std::size_t i = 1; i < lines.size(); ++i) {
+    const auto fields = split_lines(lines[i], ",");
+    ASSERT_EQ(fields.size(), 15u) << lines[i];
+    EXPECT_EQ(fields[0], std::to_string(i));
+    area_px += std::stod(fields[1]);
+    const double um_per_px = json["um_per_px"];
+    EXPECT_NEAR(std::stod(fields[2]), std::stod(fields[1]) * um_per_px * um_per_px, 1e-9);
+    const Vec3 centre = fixture.jobs.colony_at(kJobId, {})->colony->cell(CellId{static_cast<std::uint32_t>(i)}).centre_um;
+    EXPECT_NEAR(std::stod(fields[13]), centre.x(), 3.0) << lines[i];
+    EXPECT_NEAR(std::stod(fields[14]), centre.y(), 3.0) << lines[i];
+  }
+  EXPECT_NEAR(area_px / 6.0, json["cell_area_mean_px"].get<double>(), 1e-9);
+}
+
+TEST(ShapeTable, ACellThatIsNotSeenHasALineWithoutFigures) {
+  const FakeJobs jobs;
+  Colony colony(jobs.spec.params);
+  for (const Event& event : jobs.history) colony.apply(event);
+  LabelImage labels(9, 9, 0.5);
+  for (std::int64_t row = 2; row < 6; ++row) {
+    for (std::int64_t column = 2; column < 6; ++column) labels.at(row, column) = 2;
+  }
+  const auto rows = api::shape_rows(labels, colony, 10.0, 20.0);
+  ASSERT_TRUE(rows);
+  const auto lines = split_lines(api::shape_csv(api::cell_shape_columns(), *rows), "\r\n");
+  ASSERT_EQ(lines.size(), 7u);
+  EXPECT_EQ(lines[1], "1,0,,,,,,,,,,,,,");
+  EXPECT_THAT(lines[2], StartsWith("2,16,4,"));
+  EXPECT_THAT(lines[2], ::testing::EndsWith(",4,4,12,18"));  // centre 4 px right and down of (10, 20) um
 }
 
 TEST(Analyses, CountDrawnDiscsAndKeepThem) {
@@ -109,6 +157,32 @@ TEST(Analyses, CountDrawnDiscsAndKeepThem) {
     EXPECT_EQ(png.status, 200) << name;
     EXPECT_THAT(png.body, StartsWith("\x89PNG")) << name;
   }
+  const Json& result = made["result"];
+  EXPECT_EQ(result["segmentation"]["pipeline_reason"], "asked for");
+  EXPECT_TRUE(result["segmentation"]["pipeline_given"].get<bool>());
+  EXPECT_EQ(result["image"]["um_per_px"], 0.5);
+  EXPECT_EQ(result["image"]["um_per_px_source"], "given");
+  // The dimension at each level of the sweep, and in words what it says.
+  const Json& rows = result["threshold_sweep"]["rows"];
+  ASSERT_EQ(rows.size(), result["segmentation"]["sweep"].size());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    EXPECT_EQ(rows[i]["threshold"], result["segmentation"]["sweep"][i]["threshold"]);
+    EXPECT_NEAR(rows[i]["walls"]["d0"]["value"].get<double>(), result["fractal"]["walls"]["d0"]["value"].get<double>(), 0.1);
+  }
+  const std::string words = result["verdict"].dump();
+  EXPECT_THAT(words, HasSubstr("the cell walls could be counted at " + std::to_string(rows.size()) + " of"));
+  EXPECT_THAT(words, HasSubstr("What follows for the cell walls"));
+  // Each object a line, in both forms.
+  auto table = fixture.get(made["links"]["objects"].get<std::string>(), {{"Accept", "text/csv"}});
+  const auto lines = split_lines(table.body, "\r\n");
+  ASSERT_EQ(lines.size(), 37u);
+  EXPECT_THAT(lines[0], StartsWith("object_id,area_px,area_um2,"));
+  auto items = fixture.get(made["links"]["objects"].get<std::string>());
+  const Json objects = json_of(items);
+  ASSERT_EQ(objects["items"].size(), 36u);
+  EXPECT_EQ(objects["items"][7]["object_id"], 8);
+  EXPECT_EQ(objects["items"][7]["area_um2"].get<double>(), 0.25 * objects["items"][7]["area_px"].get<double>());
+  EXPECT_EQ(fixture.get(self + "x/objects").status, 404);
   auto absent = fixture.get(self + "/steps/dream");
   EXPECT_EQ(absent.status, 404);
   EXPECT_EQ(fixture.ask("DELETE", self).status, 204);
@@ -183,7 +257,10 @@ TEST(Comparisons, MatchThePixelsOfACell) {
   EXPECT_NEAR(simulated / real, 1.0, 0.02);
   EXPECT_EQ(made["result"]["simulated"]["controls"].size(), 3u);
   EXPECT_EQ(made["result"]["real"]["controls"].size(), 2u);
-  EXPECT_FALSE(made["result"]["verdict"].empty());
+  const std::string words = made["result"]["verdict"].dump();
+  EXPECT_THAT(words, HasSubstr("The cell walls: no comparison: the colony's has no figures"));  // six small cells: too few box sides
+  EXPECT_THAT(words, HasSubstr("The picture. What follows for the cell walls"));
+  EXPECT_EQ(made["result"]["real"]["threshold_sweep"]["rows"].size(), 9u);
   auto figure = fixture.get(made["links"]["figure"].get<std::string>());
   EXPECT_EQ(figure.status, 200);
   EXPECT_THAT(figure.body, StartsWith("\x89PNG"));
@@ -196,6 +273,38 @@ TEST(Comparisons, MatchThePixelsOfACell) {
   auto no_job = fixture.post("/v1/comparisons",
                              api::to_text({{"job_id", "x"}, {"analysis_id", analysis["id"]}}));
   EXPECT_THAT(faults(no_job), ElementsAre("/job_id"));
+}
+
+TEST(Comparisons, OfALargeColonyPictureAreWorkedOnLaterThoughThePhotographIsSmall) {
+  ApiFixture fixture;
+  // One ring that encloses half a million pixels: at so many a cell, six cells take millions.
+  std::vector<std::uint8_t> rows(900 * 900, 255);
+  for (int y = 0; y < 900; ++y) {
+    for (int x = 0; x < 900; ++x) {
+      const int distance2 = (x - 450) * (x - 450) + (y - 450) * (y - 450);
+      if (distance2 <= 421 * 421 && distance2 >= 419 * 419) rows[static_cast<std::size_t>(900 * y + x)] = 0;
+    }
+  }
+  auto sent = send_picture(fixture, colony::testing::png_file(900, 900, {}, rows));
+  ASSERT_EQ(sent.status, 201) << sent.body;
+  const Json analysis = json_of(sent);
+  auto response = fixture.post("/v1/comparisons", api::to_text({{"job_id", kJobId}, {"analysis_id", analysis["id"]}}));
+  ASSERT_EQ(response.status, 202) << response.body;
+  EXPECT_EQ(json_of(response)["state"], "queued");
+}
+
+TEST(Comparisons, TheEstimateOfTheirSizeIsThatOfTheFrame) {
+  const FakeJobs jobs;
+  Colony colony(jobs.spec.params);
+  for (const Event& event : jobs.history) colony.apply(event);
+  PictureSpec spec;
+  spec.um_per_px = *api::matched_scale(colony, 4000.0, {});
+  const auto frame = frame_of(colony, spec);
+  ASSERT_TRUE(frame);
+  const auto pixels = static_cast<double>(frame->width_px * frame->height_px);
+  const auto estimate = static_cast<double>(api::compared_px_estimate(colony, 4000.0));
+  EXPECT_GT(estimate, 0.6 * pixels);
+  EXPECT_LT(estimate, 1.3 * pixels);
 }
 
 TEST(Ink, EnclosesItsCells) {

@@ -111,7 +111,7 @@ class FakeJobs : public JobService {
   Result<std::vector<LogRow>> log(const std::string& id, std::int64_t after, std::size_t) override {
     if (id != row.id) return missing(id);
     if (after > 0) return std::vector<LogRow>{};
-    return std::vector<LogRow>{{1, "2026-01-02T03:04:05.678Z", "info", "submitted", "local"}};
+    return std::vector<LogRow>{{1, "2026-01-02T03:04:05.678Z", "info", "submitted", {}}};
   }
   Result<ColonyAt> colony_at(const std::string& id, std::optional<double> at_h) override {
     if (id != row.id) return missing(id);

@@ -311,7 +311,7 @@ TEST(Jobs, UnknownOnesAre404) {
 
 TEST(Jobs, WhatBelongsToLaterVersionsIsNotThere) {
   ApiFixture fixture;
-  for (const std::string& path : {std::string("/v1/sweeps"), std::string("/v1/tokens"), std::string("/docs")}) {
+  for (const std::string& path : {std::string("/v1/sweeps"), std::string("/docs")}) {
     EXPECT_EQ(fixture.get(path).status, 404) << path;
   }
   EXPECT_EQ(fixture.post(kJob + "/fork", "{}").status, 404);

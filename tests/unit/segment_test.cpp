@@ -79,6 +79,49 @@ TEST(Segment, TheSweepStandsAroundTheThresholdAndContainsTheAnswer) {
   EXPECT_EQ(given.foreground_px, result.sweep[7].foreground_px);
 }
 
+TEST(Segment, TheSweepHandsOverWhatItCountsTheAnswerFirst) {
+  double area_px = 0.0;
+  const GreyImage image = nuclei_scene(5, &area_px);
+  std::vector<SweepPoint> seen;
+  SegmentOptions options;
+  options.at_threshold = [&](const ThresholdView& view) {
+    std::int64_t objects = 0, pixels = 0;
+    for (const std::uint32_t label : view.labels.values) {
+      objects = std::max<std::int64_t>(objects, label);
+      pixels += label != 0;
+    }
+    seen.push_back({view.threshold, pixels, objects});
+    EXPECT_EQ(view.pipeline, Pipeline::kNuclei);
+    EXPECT_EQ(view.mask.values.size(), view.labels.values.size());
+  };
+  const Segmentation result = found_in(image, options);
+  ASSERT_EQ(seen.size(), 9U);
+  EXPECT_EQ(seen[0].threshold, result.threshold);
+  std::sort(seen.begin(), seen.end(), [](const SweepPoint& a, const SweepPoint& b) { return a.threshold < b.threshold; });
+  for (std::size_t i = 0; i < 9; ++i) {
+    EXPECT_EQ(seen[i].threshold, result.sweep[i].threshold);
+    EXPECT_EQ(seen[i].foreground_px, result.sweep[i].foreground_px);
+    EXPECT_EQ(seen[i].object_count, result.sweep[i].object_count);
+  }
+  seen.clear();
+  options.sweep = false;
+  EXPECT_TRUE(found_in(image, options).sweep.empty());
+  EXPECT_TRUE(seen.empty());
+}
+
+TEST(Segment, SaysWhyItChoseAndWhatElseThereIs) {
+  double area_px = 0.0;
+  const GreyImage image = nuclei_scene(1, &area_px);
+  const Segmentation chosen = found_in(image);
+  EXPECT_FALSE(chosen.pipeline_given || chosen.foreground_given);
+  EXPECT_THAT(chosen.pipeline_reason, HasSubstr("an even ground at one end of the histogram"));
+  EXPECT_THAT(chosen.pipeline_reason, HasSubstr("pipeline=phase"));  // who sent actin reads here what to do
+  EXPECT_THAT(chosen.foreground_reason, HasSubstr("the light end"));
+  const Segmentation asked = found_in(image, {.pipeline = Pipeline::kPhase, .foreground = Foreground::kLight});
+  EXPECT_TRUE(asked.pipeline_given && asked.foreground_given);
+  EXPECT_EQ(asked.pipeline_reason, "asked for");
+}
+
 TEST(Segment, EveryStepIsKeptByNameOrOnlyTheOneAskedFor) {
   double area_px = 0.0;
   const GreyImage image = nuclei_scene(1, &area_px);

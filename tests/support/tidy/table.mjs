@@ -34,6 +34,7 @@ export const thirdParty = [
   { prefix: 'SQLiteCpp/', places: ['server/store/'] },
   { prefix: 'spng.h', places: ['engine/picture/', 'engine/analysis/'] },
   { prefix: 'tiffio.h', places: ['engine/analysis/', 'engine/picture/'] },
+  { prefix: 'expat.h', places: ['engine/analysis/'] },
   { prefix: 'turbojpeg.h', places: ['engine/analysis/'] },
   { prefix: 'opencv2/', places: ['engine/analysis/', 'engine/picture/'] },
   { prefix: 'tiny_gltf.h', places: ['server/api/glb.*'] },

@@ -1,0 +1,62 @@
+#include "engine/analysis/threshold_sweep.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "engine/analysis/contour.hpp"
+
+namespace colony {
+namespace {
+
+/// The extremes of one line over the rows, in words.
+std::string hanging_text(const std::string& name, const ThresholdSweep& sweep, MeasuredLine ThresholdRow::* line) {
+  const ThresholdRow *low = nullptr, *high = nullptr;
+  std::size_t counted = 0;
+  for (const ThresholdRow& row : sweep.rows) {
+    if (!(row.*line).dimensions) continue;
+    ++counted;
+    const auto value = [&](const ThresholdRow* of) { return (of->*line).dimensions->capacity.value; };
+    if (low == nullptr || value(&row) < value(low)) low = &row;
+    if (high == nullptr || value(&row) > value(high)) high = &row;
+  }
+  const std::string begin = "Threshold " + std::to_string(sweep.rows.front().threshold) + " to " +
+                            std::to_string(sweep.rows.back().threshold) + ": the " + name + " could be counted at " +
+                            std::to_string(counted) + " of " + std::to_string(sweep.rows.size()) + " levels";
+  if (counted < 2) return begin + ": whether the value hangs on the threshold is not known.";
+  const Dimension& least = (low->*line).dimensions->capacity;
+  const Dimension& most = (high->*line).dimensions->capacity;
+  return begin + ", with D0 from " + decimals(least.value) + " (at " + std::to_string(low->threshold) + ") to " + decimals(most.value) +
+         " (at " + std::to_string(high->threshold) + "): " +
+         (dimensions_differ(least, most) ? "more than errors and bias: part of the value is the threshold's."
+                                         : "no more than errors and bias: the value does not hang on the threshold.");
+}
+
+}  // namespace
+
+void ThresholdLines::add(const ThresholdView& view) {
+  const bool is_ink = view.pipeline == Pipeline::kContours;  // drawn lines are counted as they are
+  const Result<BinaryImage> walls = is_ink ? Result<BinaryImage>(view.mask) : cell_walls(view.labels);
+  const Result<BinaryImage> outline = is_ink ? colony_outline(view.mask) : colony_outline(view.labels);
+  if (sweep_.rows.empty() && walls) {
+    std::vector<std::int64_t> sides = geometric_sides(foreground_box(*walls).longer_side(), boxes_);
+    if (sides.size() >= kSidesMin) boxes_.sides_px = sweep_.sides_px = std::move(sides);
+  }
+  ThresholdRow row{view.threshold, {}, {}};
+  if (sweep_.sides_px.empty()) {
+    row.walls.reason = row.outline.reason = "the lines at the answer's own threshold leave fewer than " + std::to_string(kSidesMin) + " box sides";
+  } else {
+    row.walls = measure_line(walls, boxes_, stop_);
+    row.outline = measure_line(outline, boxes_, stop_);
+  }
+  sweep_.rows.push_back(std::move(row));
+}
+
+ThresholdSweep ThresholdLines::finish() {
+  std::sort(sweep_.rows.begin(), sweep_.rows.end(), [](const ThresholdRow& a, const ThresholdRow& b) { return a.threshold < b.threshold; });
+  if (!sweep_.rows.empty()) {
+    sweep_.sentences = {hanging_text("cell walls", sweep_, &ThresholdRow::walls), hanging_text("colony outline", sweep_, &ThresholdRow::outline)};
+  }
+  return std::exchange(sweep_, {});
+}
+
+}  // namespace colony
