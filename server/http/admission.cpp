@@ -68,6 +68,8 @@ ClientAddress forwarded_address(const Headers& headers, const ClientAddress& pee
   return address ? std::move(*address) : peer;
 }
 
+Refusal token_has_ended() { return unauthorized("the token has ended meanwhile", "invalid_token"); }
+
 Admission::Admission(AdmissionConfig config, const TokenTable& tokens)
     : config_(config),
       tokens_(tokens),

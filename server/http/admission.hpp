@@ -40,6 +40,9 @@ std::optional<ClientAddress> client_address(std::string_view ip);
 /// Of the last entry of X-Forwarded-For: the one that the proxy wrote and no client can forge. Absent or no address: the peer.
 ClientAddress forwarded_address(const Headers& headers, const ClientAddress& peer);
 
+/// 401 for a token that was good when the request came.
+Refusal token_has_ended();
+
 class Admission {
  public:
   struct Moment {

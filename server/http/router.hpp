@@ -29,7 +29,7 @@ class Router {
   void add(std::string method, std::string pattern, Handler handler, Weight weight = Weight::kLight,
            Access access = Access::kRead);
   /// HEAD needs what GET does, OPTIONS nothing (a browser sends it without the token); what is nowhere needs a token all the
-  /// same, so that a stranger learns no paths.
+  /// same: 404 is told to those who are let in.
   Access access_of(std::string_view method, const std::string& path) const;
   bool is_heavy(const Request& request) const;
   /// Who hears what a handler or a stream threw (any thread); the client gets the request id only.

@@ -124,6 +124,7 @@ Awaitable<bool> Session::serve_one() {
   if (!refusal_) {
     if (is_inside_) {
       co_await handle();
+      settle_answer();
     } else {
       response_ = problem(404, "not-found", "There is nothing here", "no resource has the path " + request_.path,
                           request_.request_id);
@@ -263,14 +264,24 @@ Awaitable<void> Session::handle() {
   const bool is_queued = shared_.workers.submit_request(std::move(task), shared_.router.is_heavy(request_));
   if (is_queued) {
     co_await wait_for_worker();
-    answer_preflight();
-    if (response_.stream) {
-      response_.stream = guarded(std::move(response_.stream), shared_.admission.tokens(), request_.principal);
-    }
   } else {
     refusal_ =
         Refusal{503, "overloaded", "The server is busy", "too many requests wait already; try again in a second"};
   }
+}
+
+// A token may have ended while the answer was made. What was done was done by right; what was found is not told any more.
+void Session::settle_answer() {
+  const TokenTable& tokens = shared_.admission.tokens();
+  const Principal& who = request_.principal;
+  const bool is_question = head_.method == "GET" || head_.method == "HEAD";
+  if (is_question && !who.token_id.empty() && !tokens.is_alive(who.token_id, unix_time_ms())) {
+    let_go_of_stream();
+    refusal_ = token_has_ended();
+    return;
+  }
+  if (response_.stream) response_.stream = guarded(std::move(response_.stream), tokens, who);
+  answer_preflight();
 }
 
 // A browser asks so before it lets a page of a listed site ask. The router's answer to OPTIONS says the methods.

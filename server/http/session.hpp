@@ -83,6 +83,7 @@ class Session : public std::enable_shared_from_this<Session> {
   std::optional<Refusal> take_large_body();
   void give_back_large_body();
   bool fill_request();
+  void settle_answer();
   void answer_preflight();
   WorkerPool::Task as_worker_task(std::function<void()> work);
   void prepare_response();

@@ -103,6 +103,26 @@ TEST(HttpSecurity, AStreamEndsWithItsToken) {
   EXPECT_TRUE(client.read_until("bye;")) << "at once, not at the next sign of life";
 }
 
+TEST(HttpSecurity, WhatWasFoundIsNotToldToATokenThatEndedMeanwhile) {
+  TokenTable* table = nullptr;
+  TestServer server(
+      [&table](Router& router) {
+        const auto ends = [&table](const Request& request) {
+          table->remove(request.principal.token_id);
+          return text("found");
+        };
+        router.add("GET", "/slow", ends);
+        router.add("POST", "/slow", ends, Router::Weight::kLight, Access::kSubmit);
+      },
+      with_tokens());
+  table = &server.tokens;
+  server.run();
+  EXPECT_EQ(RawClient(server.port()).ask(get("/slow", bearer(add_token(server, "a", Scope::kRead)))).status, 401);
+  const std::string submit = add_token(server, "b", Scope::kSubmit);
+  EXPECT_EQ(RawClient(server.port()).ask("POST /slow HTTP/1.1\r\n" + bearer(submit) + "Content-Length: 0\r\n\r\n").body,
+            "found") << "what is done is said to be done";
+}
+
 TEST(HttpSecurity, OneAddressHasItsShareOfConnectionsOnly) {
   ServerConfig config;
   config.connections_per_address_max = 2;
