@@ -36,7 +36,7 @@ std::optional<std::chrono::milliseconds> retry_after(const HttpResponse& respons
 }  // namespace
 
 HttpClient& Session::client() {
-  if (!client_) client_ = std::make_unique<HttpClient>(read_settings(env, server_flag), env.interrupt);
+  if (!client_) client_ = std::make_unique<HttpClient>(read_settings(env, server_flag, ca_file_flag), env.interrupt);
   return *client_;
 }
 

@@ -17,6 +17,7 @@ struct Session {
 
   Environment& env;
   std::string server_flag;
+  std::string ca_file_flag;
   bool json = false;
 
   HttpClient& client();

@@ -78,9 +78,13 @@ std::optional<http::Response> answer_now(const Endpoint& endpoint, Context& cont
   return job_answer(*text);
 }
 
-Api::Api(JobService& jobs, ApiConfig config) {
+http::Access access_of(const Endpoint& endpoint) {
+  return endpoint.access.value_or(endpoint.method == "GET" ? http::Access::kRead : http::Access::kSubmit);
+}
+
+Api::Api(JobService& jobs, http::TokenTable& tokens, ApiConfig config) {
   const SpecLimits limits{config.jobs.cells_max};
-  context_ = std::unique_ptr<Context>(new Context{jobs, std::move(config), false, {}, {}});
+  context_ = std::unique_ptr<Context>(new Context{jobs, tokens, std::move(config), false, {}, {}});
   context_->job_texts = std::make_shared<JobTexts>(jobs, context_->config.base_path);
   context_->feeds = std::make_shared<Feeds>(jobs);
   context_->schema_text = to_text(job_spec_schema(limits));
@@ -114,7 +118,7 @@ void Api::add_routes(http::Router& router) {
                [&endpoint, context = context_.get()](const http::Request& request) {
                  return run_endpoint(endpoint, *context, request);
                },
-               endpoint.is_heavy ? http::Router::Weight::kHeavy : http::Router::Weight::kLight);
+               endpoint.is_heavy ? http::Router::Weight::kHeavy : http::Router::Weight::kLight, access_of(endpoint));
     if (endpoint.handler == &get_job) {
       router.set_ready("GET", pattern, [&endpoint, context = context_.get()](const http::Request& request) {
         return answer_now(endpoint, *context, request);

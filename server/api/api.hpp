@@ -8,6 +8,7 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
@@ -19,6 +20,7 @@
 #include "server/api/problems.hpp"
 #include "server/api/query.hpp"
 #include "server/http/router.hpp"
+#include "server/http/tokens.hpp"
 #include "server/jobs/analysis_worker.hpp"
 #include "server/jobs/service.hpp"
 
@@ -63,6 +65,7 @@ class JobTexts;
 /// What handlers work with.
 struct Context {
   JobService& jobs;
+  http::TokenTable& tokens;
   const ApiConfig config;
   std::atomic<bool> draining{false};  // asks long computations to give up, too
   std::string schema_text;            // made once
@@ -74,6 +77,7 @@ struct Context {
   std::shared_ptr<Feeds> feeds = {};         // of the streams, which all end before it
   std::atomic<std::size_t> waiting{0};  // requests that wait for a job to change
   std::string docs_text = {};           // the page of /docs, made once
+  std::mutex tokens_mutex = {};  // a change of the stored tokens and of `tokens` is one
 };
 
 /// A request that has passed the table's checks.
@@ -112,7 +116,11 @@ struct Endpoint {
   /// the two form types can (CORS safelist), so exactly these are demanded.
   std::vector<std::string_view> body_media = {};
   Validator validator = Validator::kNone;
+  /// What it needs where tokens are required; nullopt: read for GET, submit for all else. So only the exceptions are written down.
+  std::optional<http::Access> access = std::nullopt;
 };
+
+http::Access access_of(const Endpoint& endpoint);
 
 std::span<const Endpoint> endpoints();
 /// Rows of the table that stand beside their handlers (handlers_fork.cpp).
@@ -122,7 +130,8 @@ std::vector<Endpoint> further_endpoints();
 
 class Api {
  public:
-  Api(JobService& jobs, ApiConfig config);
+  /// `tokens`: the table that admission asks; kept the same as the stored ones. Both outlive it.
+  Api(JobService& jobs, http::TokenTable& tokens, ApiConfig config);
   ~Api();
   /// Takes up analyses that are queued. Before it, and without it, they wait.
   Status start();
@@ -191,6 +200,9 @@ http::Response get_comparison_figure(Context& context, const Call& call);
 http::Response get_job_schema(Context& context, const Call& call);
 http::Response get_openapi(Context& context, const Call& call);
 http::Response get_service_info(Context& context, const Call& call);
+http::Response post_token(Context& context, const Call& call);
+http::Response get_tokens(Context& context, const Call& call);
+http::Response delete_token(Context& context, const Call& call);
 http::Response get_healthz(Context& context, const Call& call);
 http::Response get_readyz(Context& context, const Call& call);
 

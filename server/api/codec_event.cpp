@@ -153,7 +153,8 @@ void append_job_text(std::string& out, const JobView& view, std::string_view bas
 }
 
 Json encode_log_row(const LogRow& row) {
-  return {{"index", row.index}, {"at", row.at}, {"level", row.level}, {"message", row.message}};
+  return {{"index", row.index}, {"at", row.at}, {"level", row.level}, {"message", row.message},
+          {"actor", row.actor.empty() ? Json(nullptr) : Json(row.actor)}};
 }
 
 }  // namespace colony::server::api

@@ -4,6 +4,7 @@
 #include "server/api/codec_analysis.hpp"
 #include "server/api/codec_event.hpp"
 #include "server/api/codec_patch.hpp"
+#include "server/api/handlers_tokens.hpp"
 #include "server/api/codec_report.hpp"
 #include "server/api/problems.hpp"
 #include "server/api/schema.hpp"
@@ -290,12 +291,14 @@ Json component_schemas(const SpecLimits& limits) {
       {"LogLine", strict_object({{"index", count()},
                                  {"at", wall_time(false)},
                                  {"level", {{"enum", Json::array({"info", "warning", "error"})}}},
-                                 {"message", typed("string")}})},
+                                 {"message", typed("string")},
+                                 {"actor", nullable("string")}})},
       {"ServiceInfo", service_info_schema()},
       {"Health", strict_object({{"status", typed("string")}})},
       {"Problem", problem_schema()}};
   components.update(report_components());
   components.update(analysis_components());
+  components.update(token_components());
   return components;
 }
 

@@ -3,6 +3,7 @@
 
 #include "engine/picture/mesh.hpp"
 #include "server/api/api.hpp"
+#include "server/api/endpoints_service.hpp"
 #include "server/api/measure.hpp"
 
 namespace colony::server::api {
@@ -360,6 +361,7 @@ std::span<const Endpoint> endpoints() {
     std::vector<Endpoint> all = make_endpoints();
     for (Endpoint& row : fork_endpoints()) all.push_back(std::move(row));
     for (Endpoint& further : further_endpoints()) all.push_back(std::move(further));
+    for (Endpoint& endpoint : service_endpoints()) all.push_back(std::move(endpoint));
     return all;
   }();
   return table;

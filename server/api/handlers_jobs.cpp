@@ -43,11 +43,11 @@ class ManyFounders {
 };
 
 http::Response command(Context& context, const Call& call,
-                       Result<JobService::Commanded> (JobService::*method)(const std::string&)) {
+                       Result<JobService::Commanded> (JobService::*method)(const std::string&, const std::string&)) {
   if (const Status arguments = check_no_arguments(call.request.body); !arguments)
     return failure(arguments.error(), call);
   if (auto refused = refused_by_if_match(context, call)) return std::move(*refused);
-  const auto done = (context.jobs.*method)(call.id());
+  const auto done = (context.jobs.*method)(call.id(), call.request.principal.name);
   if (!done) return failure(done.error(), call);
   return job_response(context, done->changed ? 202 : 200, done->view);
 }
@@ -82,6 +82,7 @@ http::Response post_job(Context& context, const Call& call) {
                                {"estimate", encode_estimate(estimate(spec->run, context.config.jobs.threads_per_job))}});
   }
   NewJob job = new_job(*spec);
+  job.submitted_by = call.request.principal.name;
   job.idempotency_key = *key;
   job.body_hash = hash_of_body("", call.request.body);
   const auto submitted = context.jobs.submit(job);

@@ -1,6 +1,7 @@
 #include "server/api/openapi.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 
@@ -103,7 +104,8 @@ Json success_answer(const Endpoint& endpoint, int status, std::string_view descr
 // What the request gate and the checks before a handler can answer to any request.
 const std::map<int, std::string_view>& common_problems() {
   static const std::map<int, std::string_view> table = {{400, "the request cannot be read"},
-                                                        {403, "a foreign Origin"},
+                                                        {401, "no token, or none that is known and valid; see WWW-Authenticate"},
+                                                        {403, "a foreign Origin, or a token whose scope does not allow this"},
                                                         {404, "there is no such thing"},
                                                         {405, "a method that the path does not have; see Allow"},
                                                         {408, "the request came too slowly"},
@@ -111,6 +113,7 @@ const std::map<int, std::string_view>& common_problems() {
                                                         {414, "the target is too long"},
                                                         {421, "a Host that is not ours"},
                                                         {422, "fields or parameters are wrong"},
+                                                        {429, "too many requests; see Retry-After"},
                                                         {431, "the header is too large"},
                                                         {500, "a bug in the server"},
                                                         {501, "a method or coding that is not implemented"},
@@ -141,6 +144,14 @@ Json responses_of(const Endpoint& endpoint) {
   return responses;
 }
 
+// Of a bearer scheme the roles that are needed are listed (OpenAPI 3.1, 4.8.30): the scope. A server without tokens asks for none.
+Json security_of(const Endpoint& endpoint) {
+  constexpr std::array<const char*, 4> kScopes = {"", "read", "submit", "admin"};
+  const http::Access access = access_of(endpoint);
+  if (access == http::Access::kOpen) return Json::array();
+  return Json::array({{{"token", Json::array({kScopes[static_cast<std::size_t>(access)]})}}});
+}
+
 Json request_body_of(const Endpoint& endpoint) {
   if (endpoint.operation_id == "submitJob") {
     return {{"required", true}, {"content", {{"application/json", {{"schema", reference("JobSpec")}}}}}};
@@ -153,6 +164,9 @@ Json request_body_of(const Endpoint& endpoint) {
   }
   if (endpoint.operation_id == "compare") {
     return {{"required", true}, {"content", {{"application/json", {{"schema", reference("ComparisonSpec")}}}}}};
+  }
+  if (endpoint.operation_id == "createToken") {
+    return {{"required", true}, {"content", {{"application/json", {{"schema", reference("NewToken")}}}}}};
   }
   if (!endpoint.body_media.empty()) {
     Json content = Json::object();
@@ -181,6 +195,7 @@ Json openapi_document(std::span<const Endpoint> table, const SpecLimits& limits,
     if (const Json examples = request_examples(endpoint.operation_id); !examples.is_null()) {
       for (auto& [media, content] : operation["requestBody"]["content"].items()) content["examples"] = examples;
     }
+    operation["security"] = security_of(endpoint);
     operation["responses"] = responses_of(endpoint);
     paths[std::string(endpoint.path)][method] = std::move(operation);
   }
@@ -199,7 +214,14 @@ Json openapi_document(std::span<const Endpoint> table, const SpecLimits& limits,
           {"tags", tag_list()},
           {"paths", std::move(paths)},
           {"components",
-           {{"parameters",
+           {{"securitySchemes",
+             {{"token",
+               {{"type", "http"},
+                {"scheme", "bearer"},
+                {"description",
+                 "A token with scope read, submit or admin, each including those before it. A server that listens to its own "
+                 "machine alone may be set to need none (auth.mode = \"local\")."}}}}},
+            {"parameters",
              {{"job_id",
                {{"name", "job_id"},
                 {"in", "path"},

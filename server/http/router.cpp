@@ -86,11 +86,18 @@ Response problem(int status, std::string_view code, std::string_view title, std:
   return response;
 }
 
-void Router::add(std::string method, std::string pattern, Handler handler, Weight weight) {
+void Router::add(std::string method, std::string pattern, Handler handler, Weight weight, Access access) {
   CHECK(!pattern.empty() && pattern.front() == '/');
   auto segments = split(pattern);
   for (const auto& route : routes_) CHECK(route.method != method || route.segments != segments);
-  routes_.push_back({std::move(method), std::move(segments), std::move(handler), weight});
+  routes_.push_back({std::move(method), std::move(segments), std::move(handler), weight, access});
+}
+
+Access Router::access_of(std::string_view method, const std::string& path) const {
+  if (method == "OPTIONS") return Access::kOpen;
+  const auto* const pattern = pattern_of(split(path));
+  const Route* const route = pattern ? route_of(*pattern, method) : nullptr;
+  return route ? route->access : Access::kRead;
 }
 
 void Router::set_ready(std::string_view method, const std::string& pattern, ReadyHandler handler) {

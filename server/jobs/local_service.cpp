@@ -137,11 +137,12 @@ bool LocalJobService::wait_until_left(std::int64_t job_key) {
   return changed_.wait_for(lock, std::chrono::milliseconds(config_.command_wait_ms), left) && !live_.contains(job_key);
 }
 
-Result<JobService::Commanded> LocalJobService::command(const std::string& id, JobCommand what, LiveJob::Wish wish) {
+Result<JobService::Commanded> LocalJobService::command(const std::string& id, JobCommand what, LiveJob::Wish wish,
+                                                      const std::string& actor) {
   const auto job = store_.find_job(id);
   if (!job) return job.error();
   const std::int64_t job_key = job->job_key;
-  auto commanded = store_.command_job(job_key, what);  // durable from here on, whatever becomes of the notification
+  auto commanded = store_.command_job(job_key, what, actor);  // durable from here on, whatever becomes of the notification
   if (!commanded) return commanded.error();
   bool changed = commanded->changed;
   if (commanded->pending) {
@@ -153,7 +154,7 @@ Result<JobService::Commanded> LocalJobService::command(const std::string& id, Jo
     if (wait_until_left(job_key)) {
       // The runner has left the job: paused, cancelled, or ended by itself before the wish reached it.
       if (what == JobCommand::kResume) {
-        commanded = store_.command_job(job_key, what);
+        commanded = store_.command_job(job_key, what, actor);
         if (!commanded) return commanded.error();
         changed = changed || commanded->changed;
       } else {
@@ -172,16 +173,16 @@ Result<JobService::Commanded> LocalJobService::command(const std::string& id, Jo
   return Commanded{view_of(std::move(commanded->job)), changed};
 }
 
-Result<JobService::Commanded> LocalJobService::cancel(const std::string& id) {
-  return command(id, JobCommand::kCancel, LiveJob::Wish::kCancel);
+Result<JobService::Commanded> LocalJobService::cancel(const std::string& id, const std::string& actor) {
+  return command(id, JobCommand::kCancel, LiveJob::Wish::kCancel, actor);
 }
 
-Result<JobService::Commanded> LocalJobService::pause(const std::string& id) {
-  return command(id, JobCommand::kPause, LiveJob::Wish::kPause);
+Result<JobService::Commanded> LocalJobService::pause(const std::string& id, const std::string& actor) {
+  return command(id, JobCommand::kPause, LiveJob::Wish::kPause, actor);
 }
 
-Result<JobService::Commanded> LocalJobService::resume(const std::string& id) {
-  return command(id, JobCommand::kResume, LiveJob::Wish::kNone);
+Result<JobService::Commanded> LocalJobService::resume(const std::string& id, const std::string& actor) {
+  return command(id, JobCommand::kResume, LiveJob::Wish::kNone, actor);
 }
 
 Status LocalJobService::remove(const std::string& id) {

@@ -40,9 +40,9 @@ class LocalJobService final : public JobService {
   Result<Page> list(const JobFilter& filter, std::size_t limit, const std::string& cursor) override;
   Result<std::vector<std::uint64_t>> counts() override;
 
-  Result<Commanded> cancel(const std::string& id) override;
-  Result<Commanded> pause(const std::string& id) override;
-  Result<Commanded> resume(const std::string& id) override;
+  Result<Commanded> cancel(const std::string& id, const std::string& actor) override;
+  Result<Commanded> pause(const std::string& id, const std::string& actor) override;
+  Result<Commanded> resume(const std::string& id, const std::string& actor) override;
   Status remove(const std::string& id) override;
   Result<Edited> edit(const std::string& id, const JobTextChange& change,
                       const std::optional<std::vector<std::uint64_t>>& revisions, const std::string& actor) override;
@@ -83,7 +83,8 @@ class LocalJobService final : public JobService {
   JobView view_of(JobRow job);
   /// The seq of the last event up to `at_h`.
   Result<std::uint64_t> seq_of(const JobRow& job, std::optional<double> at_h);
-  Result<Commanded> command(const std::string& id, JobCommand command, LiveJob::Wish wish);
+  Result<Commanded> command(const std::string& id, JobCommand command, LiveJob::Wish wish,
+                            const std::string& actor);
   /// Waits until no runner holds the job; false after command_wait_ms or when draining.
   bool wait_until_left(std::int64_t job_key);
 

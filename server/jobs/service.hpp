@@ -144,9 +144,10 @@ class JobService {
 
   /// `changed` false: the job was already in the state this leads to. Another terminal state: kConflict ("job-terminal").
   struct Commanded { JobView view; bool changed = true; };
-  virtual Result<Commanded> cancel(const std::string& id) = 0;
-  virtual Result<Commanded> pause(const std::string& id) = 0;
-  virtual Result<Commanded> resume(const std::string& id) = 0;
+  /// `actor`: who asks; it goes into the job's log with what was done.
+  virtual Result<Commanded> cancel(const std::string& id, const std::string& actor) = 0;
+  virtual Result<Commanded> pause(const std::string& id, const std::string& actor) = 0;
+  virtual Result<Commanded> resume(const std::string& id, const std::string& actor) = 0;
   virtual Status remove(const std::string& id) = 0;
   /// As Store::update_job_text.
   struct Edited { JobView view; bool changed = true; bool is_current = true; };

@@ -110,8 +110,9 @@ class FailingStore final : public server::Store {
     if (set && after_set_state) after_set_state(to, reason);
     return set;
   }
-  Result<Commanded> command_job(std::int64_t job_key, server::JobCommand command) override {
-    return real_->command_job(job_key, command);
+  Result<Commanded> command_job(std::int64_t job_key, server::JobCommand command,
+                                const std::string& actor = {}) override {
+    return real_->command_job(job_key, command, actor);
   }
   Result<TextUpdated> update_job_text(std::int64_t job_key, const server::JobTextChange& change,
                                       const std::optional<std::vector<std::uint64_t>>& revisions,
@@ -123,6 +124,7 @@ class FailingStore final : public server::Store {
   std::uint64_t commit_count() const override { return real_->commit_count(); }
   Status flush() override { return real_->flush(); }
   server::AnalysisStore& analyses() override { return real_->analyses(); }
+  server::TokenStore& tokens() override { return real_->tokens(); }
   Result<std::vector<Event>> read_events(std::int64_t job_key, const server::EventFilter& filter,
                                          std::size_t limit) override {
     ++event_reads;

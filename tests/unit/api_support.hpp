@@ -68,6 +68,7 @@ class FakeJobs : public JobService {
   std::optional<std::string> asked_cursor;
   JobFilter asked_filter;
   std::size_t asked_limit = 0;
+  std::string last_actor;
 
   /// last_seq is that of the last event visible.
   JobView view() const {
@@ -132,11 +133,11 @@ class FakeJobs : public JobService {
     return Page{{view()}, cursor.empty() ? std::optional<std::string>("a cursor&") : std::nullopt};
   }
   Result<std::vector<std::uint64_t>> counts() override { return std::vector<std::uint64_t>{1, 2, 3, 4, 5, 6}; }
-  Result<Commanded> cancel(const std::string& id) override { return command(id); }
-  Result<Commanded> pause(const std::string& id) override { return command(id); }
-  Result<Commanded> resume(const std::string& id) override { return command(id); }
+  Result<Commanded> cancel(const std::string& id, const std::string& actor) override { return command(id, actor); }
+  Result<Commanded> pause(const std::string& id, const std::string& actor) override { return command(id, actor); }
+  Result<Commanded> resume(const std::string& id, const std::string& actor) override { return command(id, actor); }
   Status remove(const std::string& id) override {
-    const auto done = command(id);
+    const auto done = command(id, {});
     if (!done) return done.error();
     return Ok{};
   }
@@ -230,7 +231,8 @@ class FakeJobs : public JobService {
   std::string folder_;
 
   static Error missing(const std::string& id) { return {ErrorCode::kNotFound, "there is no job '" + id + "'"}; }
-  Result<Commanded> command(const std::string& id) {
+  Result<Commanded> command(const std::string& id, const std::string& actor) {
+    last_actor = actor;
     if (id != row.id) return missing(id);
     if (next_error) return *std::exchange(next_error, std::nullopt);
     return Commanded{view(), true};
@@ -240,8 +242,10 @@ class FakeJobs : public JobService {
 /// A router over the fake, and short ways to ask it.
 class ApiFixture {
  public:
-  explicit ApiFixture(api::ApiConfig with = config()) : api_(jobs, std::move(with)) { api_.add_routes(router_); }
+  explicit ApiFixture(api::ApiConfig with = config()) : api_(jobs, tokens, std::move(with)) { api_.add_routes(router_); }
   FakeJobs jobs;
+  http::TokenTable tokens;
+  http::Principal principal;
 
   static api::ApiConfig config() {
     api::ApiConfig config;
@@ -266,6 +270,7 @@ class ApiFixture {
     for (const auto& [name, value] : headers) request.headers.add(name, value);
     request.body = std::move(body);
     request.request_id = "request-1";
+    request.principal = principal;
     return router_.dispatch(request);
   }
   http::Response get(const std::string& target, std::vector<std::pair<std::string, std::string>> headers = {}) {

@@ -67,6 +67,21 @@ TEST_F(Cli, SettingsRiseFromFileToEnvironmentToFlag) {
   EXPECT_THAT(err(), HasSubstr("config.toml: servr: unknown key"));
 }
 
+TEST_F(Cli, ATokenGoesNowhereInTheClear) {
+  variables_["COLONY_TOKEN"] = "secret-token";
+  for (const char* server : {"http://lab.example", "http://localhost.evil.example", "http://127.0.0.1.evil.example:80",
+                             "http://10.0.0.1:8080/x"}) {
+    EXPECT_EQ(run({"counts", "--server", server}), 2) << server;
+    EXPECT_THAT(err(), HasSubstr("in the clear"));
+    EXPECT_THAT(err() + out(), ::testing::Not(HasSubstr("secret-token")));
+  }
+  EXPECT_EQ(run({"counts", "--server", closed_server()}), 3) << "this machine is asked";
+  EXPECT_EQ(run({"counts", "--server", "https://127.0.0.1:1", "--ca-file", "/no/such/file"}), 2);
+  EXPECT_THAT(err(), HasSubstr("--ca-file"));
+  write_file(".config/colony/config.toml", "ca_file = 1\n");
+  EXPECT_EQ(run({"counts"}), 2);
+}
+
 TEST_F(Cli, ProblemsNameTheField) {
   FakeServer server([](const FakeRequest&, const FakeConnection& to) {
     to.send(json_answer(

@@ -21,6 +21,12 @@ http::Response patch(ApiFixture& fixture, const std::string& body, std::vector<s
   return fixture.ask("PATCH", kJob, std::move(headers), body);
 }
 
+void add_event(ApiFixture& fixture) {
+  Event event = fixture.jobs.history.back();
+  fixture.jobs.row.last_seq = ++event.seq;
+  fixture.jobs.history.push_back(event);
+}
+
 std::string tag_of(const ApiFixture& fixture) {
   return '"' + std::to_string(fixture.jobs.row.revision) + '.' + std::to_string(fixture.jobs.row.last_seq) + '"';
 }
@@ -34,7 +40,7 @@ TEST(Job, HasTheTagOfItsRevisionAndLastSeq) {
   EXPECT_EQ(fixture.get(kJob, {{"If-None-Match", "*"}}).status, 304);
   EXPECT_EQ(fixture.get("/v1/jobs/none", {{"If-None-Match", "*"}}).status, 404);
   const std::string before = tag_of(fixture);
-  ++fixture.jobs.row.last_seq;
+  add_event(fixture);
   EXPECT_EQ(fixture.get(kJob, {{"If-None-Match", before}}).status, 200) << "more events";
 }
 
@@ -63,7 +69,7 @@ TEST(Wait, EndsWithAnotherRevisionOrAtItsTime) {
   response.later->on_ready([&] { ++woken; });
   EXPECT_EQ(fixture.jobs.followed_key, fixture.jobs.row.job_key);
   EXPECT_EQ(response.later->ask(false), nullptr);
-  ++fixture.jobs.row.last_seq;
+  add_event(fixture);
   fixture.jobs.hearer({fixture.jobs.row.job_key, JobNews::Kind::kCommit});
   EXPECT_EQ(woken, 0) << "events alone wake nobody: a growing job commits twenty times a second";
   EXPECT_EQ(response.later->ask(false), nullptr);

@@ -29,7 +29,8 @@ class KeptAnswers : public ::testing::Test {
   http::Router router;
 
  private:
-  api::Api api_{jobs, ApiFixture::config()};
+  http::TokenTable tokens_;
+  api::Api api_{jobs, tokens_, ApiFixture::config()};
 };
 
 TEST(JobText, IsThatOfTheValue) {
