@@ -15,9 +15,11 @@ packages=(
   libexpat1-dev             # engine/analysis: the scale that an OME-TIFF states
   libsqlite3-dev sqlite3                                     # server/store; the shell reads the database in the tests
   libspdlog-dev libtomlplusplus-dev                          # server
+  libssl-dev                # server/http: TLS, and tokens' randomness and hashes
   libtinygltf-dev                                            # server/api: meshes as GLB
   libcli11-dev libcurl4-openssl-dev                          # client
   libgtest-dev libgmock-dev librapidcheck-dev libbenchmark-dev   # tests
+  openssl nginx slowhttptest   # tests/system: certificates, a proxy in front, slow clients (nginx is not started, see below)
   clang-16 libclang-rt-16-dev libfuzzer-16-dev   # tests/fuzz (46 MB to fetch; clang-14 cannot compile the <ranges> of this libstdc++)
 )
 
@@ -71,6 +73,14 @@ fi
 apt_get() {
   "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -o DPkg::Lock::Timeout=120 "$@"
 }
+# nginx is a tool of the tests here and no service: Debian would start it on port 80. A policy for the time of the installation
+# forbids that; one that is there already is left alone.
+policy=/usr/sbin/policy-rc.d
+if [[ " ${missing[*]} " == *" nginx "* ]] && [ ! -e "$policy" ]; then
+  "${as_root[@]}" sh -c "printf '#!/bin/sh\nexit 101\n' >$policy && chmod +x $policy"
+  trap '"${as_root[@]}" rm -f "$policy"' EXIT
+fi
+
 # A package list may be old or, on a fresh machine, empty.
 apt_get -q update
 apt_get -q -y install --no-install-recommends "${missing[@]}"

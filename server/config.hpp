@@ -1,13 +1,13 @@
 // config: how colonyd is told what to do: built-in values, then a TOML file, then the environment, then flags; the
 // later wins. Promise: one table of keys drives all three. Unknown keys, wrong types and values out of range are errors
-// that name where
-//          they stand; nothing is clamped. An address that is not loopback is refused: this version has no tokens and
-//          no TLS.
+// that name where they stand; nothing is clamped. An address that is not loopback is refused without tokens and TLS (or a proxy
+// that does it).
 // Errors:  kInvalid; each field is "file.toml: jobs.queued_max", "COLONY_JOBS_QUEUED_MAX" or "--jobs.queued-max".
 // Threads: pure, except that the file is read.
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -16,6 +16,7 @@
 #include "engine/base/result.hpp"
 #include "server/http/server.hpp"
 #include "server/jobs/service.hpp"
+#include "server/log.hpp"
 #include "server/store/store.hpp"
 
 namespace colony::server {
@@ -27,12 +28,20 @@ struct Config {
   std::uint64_t disk_free_bytes_min = 100'000'000;  // below: /readyz says not ready
   std::uint64_t stored_image_bytes_max = 4'000'000'000;
   std::size_t analyses_waiting_max = 100;
+  LogFormat log_format = LogFormat::kText;
 };
 
-/// Either a configuration, or a text to print before ending well (--help, --version).
+/// `colonyd token create`: what its own flags say; its checks are the interface's (api/handlers_tokens).
+struct TokenRequest {
+  std::string name, scope;
+  double expires_h = 0.0;
+};
+
+/// A configuration, perhaps with a command, or a text to print before ending well (--help, --version).
 struct Invocation {
   Config config;
   std::string print;
+  std::optional<TokenRequest> token = std::nullopt;  // make one and end
 };
 
 using Environment = std::vector<std::pair<std::string, std::string>>;

@@ -16,8 +16,12 @@
 
 #include "server/api/api.hpp"
 #include "server/api/codec_fork.hpp"
+#include "server/api/handlers_tokens.hpp"
 #include "server/config.hpp"
 #include "server/http/server.hpp"
+#include "server/log.hpp"
+#include "server/store/identity.hpp"
+#include "server/token_command.hpp"
 
 extern char** environ;
 
@@ -44,9 +48,9 @@ std::uint64_t usable_cores() {
   return std::max(1U, std::thread::hardware_concurrency());
 }
 
-std::string text_of(const Error& error) {
+std::string text_of(const Error& error, const char* separator) {
   std::string text = error.message;
-  for (const FieldError& field : error.fields) text += "\n  " + field.pointer + ": " + field.message;
+  for (const FieldError& field : error.fields) text += separator + field.pointer + ": " + field.message;
   return text;
 }
 
@@ -77,18 +81,57 @@ int wait_for_signal(const sigset_t& set) {
   return signal;
 }
 
-int fail(const std::string& what, const Error& error) {
-  spdlog::error("{}: {}", what, text_of(error));
-  return 1;
+// The library only carries finished lines to standard error: in JSON they stand alone, as text behind time and level.
+class Log {
+ public:
+  explicit Log(LogFormat format) : format_(format) {
+    if (format_ == LogFormat::kJson) spdlog::set_pattern("%v");
+  }
+  void info(const std::string& text) const { write(log_event(format_, wall_time_text(), "info", text)); }
+  void warn(const std::string& text) const { write(log_event(format_, wall_time_text(), "warning", text)); }
+  int fail(const std::string& what, const Error& error) const {
+    write(log_event(format_, wall_time_text(), "error", what + ": " + text_of(error, "; ")));
+    return 1;
+  }
+  void access(const http::AccessRecord& record) const { write(log_access(format_, wall_time_text(), record)); }
+  void failure(const http::Request& request, std::string_view what) const {
+    write(log_failure(format_, wall_time_text(), request, what));
+  }
+
+ private:
+  static void write(const LogLine& line) {
+    const auto level = line.level == "error"     ? spdlog::level::err
+                       : line.level == "warning" ? spdlog::level::warn
+                                                 : spdlog::level::info;
+    spdlog::log(level, "{}", line.text);
+  }
+  const LogFormat format_;
+};
+
+void warn_of_settings(const Log& log, const Config& config, const http::TokenTable& tokens) {
+  const std::uint64_t threads = config.jobs.concurrent_max * static_cast<std::uint64_t>(config.jobs.threads_per_job);
+  log.info(std::to_string(config.jobs.concurrent_max) + " jobs at a time, " +
+           std::to_string(config.jobs.threads_per_job) + " threads a job");
+  if (threads > usable_cores()) {
+    log.warn(std::to_string(threads) + " threads are to share " + std::to_string(usable_cores()) + " cores");
+  }
+  if (config.http.tokens_required && tokens.count_alive(http::Scope::kAdmin, http::unix_time_ms()) == 0) {
+    log.warn("no valid token has scope admin: stop the server and make one with `colonyd token create`");
+  }
 }
 
 int serve(const Config& config) {
+  const Log log(config.log_format);
   const sigset_t signals = block_signals();
   allow_descriptors();
   auto store = Store::open(config.store);
-  if (!store) return fail("cannot open the data folder " + config.store.data_dir, store.error());
+  if (!store) return log.fail("cannot open the data folder " + config.store.data_dir, store.error());
+  http::TokenTable tokens;
+  if (const Status loaded = api::load_tokens((*store)->tokens(), tokens); !loaded) {
+    return log.fail("cannot read the tokens", loaded.error());
+  }
   JobsConfig jobs_config = config.jobs;
-  jobs_config.log = [](const std::string& line) { spdlog::info("{}", line); };
+  jobs_config.log = [&log](const std::string& line) { log.info(line); };
   const auto jobs = JobService::create(**store, jobs_config, api::decode_stored_spec, api::verify_codec());
 
   api::ApiConfig api_config;
@@ -102,40 +145,34 @@ int serve(const Config& config) {
   api_config.image_bytes_max = config.http.large_body_bytes_max;
   api_config.stored_image_bytes_max = config.stored_image_bytes_max;
   api_config.analyses_waiting_max = config.analyses_waiting_max;
-  api::Api api(*jobs, api_config);
+  api::Api api(*jobs, tokens, api_config);
   http::Router router;
   api.add_routes(router);
-  router.on_failure([](const http::Request& request, std::string_view what) {
-    spdlog::error("{} {} [{}]: {}", request.method, request.path, request.request_id, what);
-  });
+  router.on_failure([&log](const http::Request& request, std::string_view what) { log.failure(request, what); });
 
   http::ServerConfig http_config = config.http;
   http_config.large_body_path = "/v1/analyses";
-  auto server = http::Server::create(http_config, router, [](const http::AccessRecord& record) {
-    spdlog::info("{} {} {} {} us {} B [{}]", record.method, record.path, record.status, record.duration_us,
-                 record.body_bytes, record.request_id);
-  });
-  if (!server) return fail("cannot listen", server.error());
+  auto server = http::Server::create(http_config, router, tokens,
+                                     [&log](const http::AccessRecord& record) { log.access(record); });
+  if (!server) return log.fail("cannot listen", server.error());
   // Only now: a process that cannot serve must not take up jobs.
-  if (const Status started = jobs->start(); !started) return fail("cannot take up the jobs", started.error());
-  if (const Status started = api.start(); !started) return fail("cannot take up the analyses", started.error());
+  if (const Status started = jobs->start(); !started) return log.fail("cannot take up the jobs", started.error());
+  if (const Status started = api.start(); !started) return log.fail("cannot take up the analyses", started.error());
   (*server)->run();
   const bool is_v6 = config.http.address.find(':') != std::string::npos;
   const std::string host = is_v6 ? "[" + config.http.address + "]" : config.http.address;
-  std::printf("listening on http://%s:%u%s\n", host.c_str(), static_cast<unsigned>((*server)->port()),
+  std::printf("listening on %s://%s:%u%s\n", config.http.tls_certificate.empty() ? "http" : "https", host.c_str(), static_cast<unsigned>((*server)->port()),
               config.http.base_path.c_str());
   std::fflush(stdout);
-  spdlog::info("data in {}", config.store.data_dir);
-  const std::uint64_t threads = config.jobs.concurrent_max * static_cast<std::uint64_t>(config.jobs.threads_per_job);
-  spdlog::info("{} jobs at a time, {} threads a job", config.jobs.concurrent_max, config.jobs.threads_per_job);
-  if (threads > usable_cores()) spdlog::warn("{} threads are to share {} cores", threads, usable_cores());
+  log.info("data in " + config.store.data_dir);
+  warn_of_settings(log, config, tokens);
 
   const int signal = wait_for_signal(signals);
-  spdlog::info("ending on signal {}", signal);
+  log.info("ending on signal " + std::to_string(signal));
   api.drain();
   jobs->drain();  // first: a request that folds a long history ends with it, and stop() joins the handlers
   (*server)->stop(kGrace_ms);
-  spdlog::info("ended");
+  log.info("ended");
   return 0;
 }
 
@@ -145,13 +182,14 @@ int run(int argc, char** argv) {
   const auto invocation = configure(std::vector<std::string>(argv + 1, argv + argc), environment(), COLONY_VERSION,
                                     usable_cores());
   if (!invocation) {
-    spdlog::error("{}", text_of(invocation.error()));
+    spdlog::error("{}", text_of(invocation.error(), "\n  "));
     return 2;
   }
   if (!invocation->print.empty()) {
     std::fputs(invocation->print.c_str(), stdout);
     return 0;
   }
+  if (invocation->token) return run_token_create(invocation->config, *invocation->token);
   return serve(invocation->config);
 }
 

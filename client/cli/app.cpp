@@ -29,7 +29,7 @@ namespace {
 /// The word that stands where a command should, if it is none (CLI11 only says that a subcommand is required).
 std::optional<std::string> unknown_command(const CLI::App& app, const std::vector<std::string>& arguments) {
   for (std::size_t i = 0; i < arguments.size(); ++i) {
-    if (arguments[i] == "--server") {
+    if (arguments[i] == "--server" || arguments[i] == "--ca-file") {
       ++i;  // its value is no command
       continue;
     }
@@ -49,18 +49,20 @@ int run(const std::vector<std::string>& arguments, Environment& env) {
   app.fallthrough();  // global options may stand after the subcommand
   app.footer(
       "The server: --server, else COLONY_SERVER, else ~/.config/colony/config.toml, else http://127.0.0.1:8080.\n"
-      "COLONY_TOKEN is sent as a bearer token.\n"
+      "COLONY_TOKEN is sent as a bearer token, to https or this machine only; COLONY_CA_FILE as --ca-file.\n"
       "Exit: 0 done, 1 job failed, 2 usage, 3 not reachable, 4 refused by the server, 5 job cancelled, 130 "
       "interrupted.");
   Session session(env);
   Action action;
   app.add_option("--server", session.server_flag, "URL of the server");
+  app.add_option("--ca-file", session.ca_file_flag, "PEM file of certificates to trust for https");
   app.add_flag("--json", session.json, "Print the server's JSON");
   app.set_version_flag("--version", COLONY_VERSION);
   add_submit_command(app, session, action);
   add_fork_commands(app, session, action);
   add_watch_command(app, session, action);
   add_job_commands(app, session, action);
+  add_edit_command(app, session, action);
   add_data_commands(app, session, action);
   add_picture_commands(app, session, action);
   add_measure_commands(app, session, action);

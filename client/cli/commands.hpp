@@ -16,6 +16,7 @@ using Action = std::function<ExitCode()>;
 
 void add_job_commands(CLI::App& app, Session& session,
                       Action& action);  // list counts show cancel pause resume delete info
+void add_edit_command(CLI::App& app, Session& session, Action& action);
 void add_submit_command(CLI::App& app, Session& session, Action& action);
 void add_fork_commands(CLI::App& app, Session& session, Action& action);     // fork verify
 void add_watch_command(CLI::App& app, Session& session, Action& action);

@@ -106,6 +106,30 @@ ExitCode show_json(Session& session, const std::string& target) {
   return ExitCode::kDone;
 }
 
+/// The job; with `wait_s` as it is after its next change of state, name or labels, or as it is after that time.
+ExitCode show_job(Session& session, const std::string& text, const std::optional<std::string>& wait_s) {
+  const std::string target = job_target(resolve_job_id(session, text)).text();
+  if (!wait_s) return show_json(session, target);
+  const std::int64_t seconds = integer_option("--wait", *wait_s);
+  if (seconds < 1 || seconds > 60) throw Failure(ExitCode::kUsage, "--wait: must be within 1 to 60");
+  HttpResponse response = session.client().send({.target = target});
+  require_ok(response);
+  if (const auto tag = response.headers.find("etag"); tag != response.headers.end()) {
+    HttpRequest again;
+    again.target = target;
+    again.headers = {{"If-None-Match", tag->second}, {"Prefer", "wait=" + std::to_string(seconds)}};
+    HttpResponse later = session.client().send(again);
+    if (later.status != 304) response = std::move(later);
+    require_ok(response);
+  }
+  if (session.json) {
+    print_raw(session, response.body);
+  } else {
+    print_members(session.env.out, body_json(response), "");
+  }
+  return ExitCode::kDone;
+}
+
 ExitCode command_job(Session& session, const std::string& text, const std::string& verb) {
   const std::string id = resolve_job_id(session, text);
   HttpRequest request;
@@ -166,8 +190,17 @@ void add_job_commands(CLI::App& app, Session& session, Action& action) {
     command->add_option("ID", *id, "Job id, or its unique end")->required();
     command->callback([&session, &action, id, run] { action = [&session, id, run] { return run(session, *id); }; });
   };
-  with_id("show", "One job",
-          [](Session& s, const std::string& id) { return show_json(s, job_target(resolve_job_id(s, id)).text()); });
+  struct ShowOptions {
+    std::string id;
+    std::optional<std::string> wait_s;
+  };
+  auto shown = std::make_shared<ShowOptions>();
+  CLI::App* show = app.add_subcommand("show", "One job");
+  show->add_option("ID", shown->id, "Job id, or its unique end")->required();
+  show->add_option("--wait", shown->wait_s, "First wait for a change of its state, name or labels, at most so many seconds (up to 60)");
+  show->callback([&session, &action, shown] {
+    action = [&session, shown] { return show_job(session, shown->id, shown->wait_s); };
+  });
   with_id("cancel", "End a job; what it grew so far stays",
           [](Session& s, const std::string& id) { return command_job(s, id, "cancel"); });
   with_id("pause", "Stop a job until it is resumed",

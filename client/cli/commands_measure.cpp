@@ -137,7 +137,7 @@ Json when_done(Session& session, HttpResponse response) {
     if (session.env.interrupt.raised()) {
       throw Failure(ExitCode::kInterrupted, "interrupted; it goes on at the server as " + row.at("id").get<std::string>());
     }
-    response = session.client().send({.target = row.at("links").at("self").get<std::string>()});
+    response = session.client().send({.target = link_target(session, row, "self")});
     require_ok(response);
   }
 }
@@ -154,7 +154,7 @@ void save_steps(Session& session, const Json& row, const std::string& folder) {
     });
     if (!is_plain) throw Failure(ExitCode::kRefused, "the server names a step that cannot be a file's name");
     const std::string number = std::to_string(++index);
-    fetch_file(session, Target(row.at("links").at("steps").get<std::string>() + "/" + name), "image/png",
+    fetch_file(session, Target(link_target(session, row, "steps") + "/" + name), "image/png",
                folder + "/" + (number.size() < 2 ? "0" : "") + number + "-" + name + ".png");
   }
 }
@@ -256,7 +256,7 @@ ExitCode compare(Session& session, const CompareOptions& options) {
   request.body = body.dump();
   const Json row = when_done(session, session.client().send(request));
   if (!options.figure.empty()) {
-    fetch_file(session, Target(row.at("links").at("figure").get<std::string>()), "image/png", options.figure);
+    fetch_file(session, Target(link_target(session, row, "figure")), "image/png", options.figure);
   }
   if (session.json) {
     session.env.out << row.dump() << '\n';

@@ -41,14 +41,6 @@ bool is_transient(CURLcode code) {
   }
 }
 
-bool is_loopback(const std::string& server) {
-  const std::size_t host = server.find("://") + 3;
-  for (const char* name : {"127.", "localhost", "[::1]"}) {
-    if (server.compare(host, std::string_view(name).size(), name) == 0) return true;
-  }
-  return false;
-}
-
 }  // namespace
 
 Target& Target::add(std::string_view name, std::string_view value) {
@@ -162,6 +154,7 @@ HttpResponse HttpClient::receive(const HttpRequest& request, const Sink& sink, s
   curl_easy_setopt(easy, CURLOPT_USERAGENT, "colony");
   curl_easy_setopt(easy, CURLOPT_NOSIGNAL, 1L);
   curl_easy_setopt(easy, CURLOPT_PATH_AS_IS, 1L);
+  if (!settings_.ca_file.empty()) curl_easy_setopt(easy, CURLOPT_CAINFO, settings_.ca_file.c_str());
   if (is_loopback(settings_.server)) curl_easy_setopt(easy, CURLOPT_PROXY, "");
   curl_easy_setopt(easy, CURLOPT_CONNECTTIMEOUT, 10L);
   curl_easy_setopt(easy, CURLOPT_LOW_SPEED_LIMIT, 1L);

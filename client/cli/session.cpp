@@ -36,7 +36,7 @@ std::optional<std::chrono::milliseconds> retry_after(const HttpResponse& respons
 }  // namespace
 
 HttpClient& Session::client() {
-  if (!client_) client_ = std::make_unique<HttpClient>(read_settings(env, server_flag), env.interrupt);
+  if (!client_) client_ = std::make_unique<HttpClient>(read_settings(env, server_flag, ca_file_flag), env.interrupt);
   return *client_;
 }
 
@@ -62,6 +62,15 @@ HttpResponse Session::send_patiently(const HttpRequest& request) {
     env.interrupt.wait(delay);
     if (env.interrupt.raised()) throw Failure(ExitCode::kInterrupted, "interrupted");
   }
+}
+
+std::string link_target(Session& session, const Json& row, const char* name) {
+  const std::string link = row.at("links").at(name).get<std::string>();
+  if (!link.starts_with('/') || link.starts_with("//")) throw Failure(ExitCode::kRefused, "the server gives a link that leads elsewhere: " + printable(link));
+  const std::string& server = session.client().server();
+  const std::size_t path = server.find('/', server.find("://") + 3);
+  const std::string base = path == std::string::npos ? "" : server.substr(path);
+  return !base.empty() && link.starts_with(base + "/") ? link.substr(base.size()) : link;
 }
 
 Target job_target(const std::string& id, const std::string& rest) { return Target("/v1/jobs/" + id + rest); }

@@ -17,6 +17,7 @@ struct Session {
 
   Environment& env;
   std::string server_flag;
+  std::string ca_file_flag;
   bool json = false;
 
   HttpClient& client();
@@ -32,6 +33,10 @@ struct Session {
 /// The full id for a full id (not looked up) or for the unique end of one, found in the server's list of jobs.
 /// Errors: kUsage for what cannot be an id or is ambiguous (the candidates are named), kRefused when no job ends so.
 std::string resolve_job_id(Session& session, const std::string& text);
+
+/// A link of an answer as a target of this client: links begin with the server's base path, and so does --server.
+/// Failure kRefused if it leads elsewhere.
+std::string link_target(Session& session, const Json& row, const char* name);
 
 /// "/v1/jobs/<id>" plus `rest`.
 Target job_target(const std::string& id, const std::string& rest = {});

@@ -46,6 +46,12 @@ std::string checked_token(std::string token, const std::string& where) {
   return token;
 }
 
+std::string checked_ca_file(const std::string& path, const std::string& where) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) refuse(where, "there is no file '" + path + "'");
+  return path;
+}
+
 void read_file(const std::filesystem::path& path, Settings& settings) {
   std::error_code error;
   if (!std::filesystem::exists(path, error)) return;
@@ -60,10 +66,14 @@ void read_file(const std::filesystem::path& path, Settings& settings) {
   for (const auto& [key, value] : table) {
     const std::string where = path.string() + ": " + std::string(key.str());
     const auto text = value.value<std::string>();
-    if (key.str() != "server" && key.str() != "token") refuse(where, "unknown key; known are server and token");
+    if (key.str() != "server" && key.str() != "token" && key.str() != "ca_file") {
+      refuse(where, "unknown key; known are server, token and ca_file");
+    }
     if (!value.is_string() || !text) refuse(where, "must be a string");
     if (key.str() == "server") {
       settings.server = checked_server(*text, where);
+    } else if (key.str() == "ca_file") {
+      settings.ca_file = checked_ca_file(*text, where);
     } else {
       settings.token = checked_token(*text, where);
     }
@@ -72,7 +82,16 @@ void read_file(const std::filesystem::path& path, Settings& settings) {
 
 }  // namespace
 
-Settings read_settings(const Environment& env, const std::string& server_flag) {
+bool is_loopback(const std::string& server) {
+  const std::size_t begin = server.find("://") + 3;
+  std::string host = server.substr(begin, server.find_first_of("/?#", begin) - begin);
+  if (const auto colon = host.rfind(':'); colon != std::string::npos && host.back() != ']') host.resize(colon);
+  if (host == "localhost" || host == "[::1]") return true;
+  const bool is_number = host.find_first_not_of("0123456789.") == std::string::npos;
+  return is_number && host.starts_with("127.");
+}
+
+Settings read_settings(const Environment& env, const std::string& server_flag, const std::string& ca_file_flag) {
   Settings settings;
   const auto config_home = env.variable("XDG_CONFIG_HOME");
   const auto home = env.variable("HOME");
@@ -87,7 +106,14 @@ Settings read_settings(const Environment& env, const std::string& server_flag) {
   if (const auto token = env.variable("COLONY_TOKEN"); token && !token->empty()) {
     settings.token = checked_token(*token, "COLONY_TOKEN");
   }
+  if (const auto ca_file = env.variable("COLONY_CA_FILE"); ca_file && !ca_file->empty()) {
+    settings.ca_file = checked_ca_file(*ca_file, "COLONY_CA_FILE");
+  }
   if (!server_flag.empty()) settings.server = checked_server(server_flag, "--server");
+  if (!ca_file_flag.empty()) settings.ca_file = checked_ca_file(ca_file_flag, "--ca-file");
+  if (!settings.token.empty() && !settings.server.starts_with("https://") && !is_loopback(settings.server)) {
+    refuse(settings.server, "a token would travel in the clear; write https://");
+  }
   return settings;
 }
 

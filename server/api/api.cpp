@@ -3,12 +3,24 @@
 
 #include "engine/base/stop.hpp"
 #include "server/api/analysis_work.hpp"
+#include "server/api/codec_event.hpp"
+#include "server/api/docs.hpp"
 #include "server/api/feed.hpp"
 #include "server/api/job_texts.hpp"
 #include "server/api/openapi.hpp"
 #include "server/api/schema.hpp"
 
 namespace colony::server::api {
+
+namespace {
+
+/// Accept-Post, Accept-Patch: what a body may be.
+std::string accept_name(const Endpoint& endpoint) { return endpoint.method == "POST" ? "Accept-Post" : "Accept-Patch"; }
+std::string body_offer(const Endpoint& endpoint) {
+  return endpoint.body_media.empty() ? "application/json" : joined(endpoint.body_media);
+}
+
+}  // namespace
 
 http::Response run_endpoint(const Endpoint& endpoint, Context& context, const http::Request& request) {
   auto query = Query::parse(request, endpoint.query);
@@ -26,17 +38,27 @@ http::Response run_endpoint(const Endpoint& endpoint, Context& context, const ht
   }
   // Asked of every POST, with a body or without: a page of another site cannot send this type unasked (CORS).
   const bool takes_json = endpoint.body_media.empty();
-  if (endpoint.method == "POST" &&
+  if ((endpoint.method == "POST" || endpoint.method == "PATCH") &&
       !(takes_json ? has_json_body(request.headers) : has_body_of(request.headers, endpoint.body_media))) {
-    const std::string wanted = takes_json ? "application/json" : "one of " + joined(endpoint.body_media);
-    return problem_response(ProblemKind::kUnsupportedMediaType,
-                            {ErrorCode::kInvalid,
-                             "this POST must have the Content-Type " + wanted,
-                             {{"Content-Type", "must be " + wanted}}},
-                            request.request_id);
+    const std::string offered = body_offer(endpoint);
+    const std::string wanted = (endpoint.body_media.size() > 1 ? "one of " : "") + offered;
+    http::Response response = problem_response(ProblemKind::kUnsupportedMediaType,
+                                               {ErrorCode::kInvalid,
+                                                "this " + std::string(endpoint.method) + " must have the Content-Type " + wanted,
+                                                {{"Content-Type", "must be " + wanted}}},
+                                               request.request_id);
+    response.headers.set(accept_name(endpoint), offered);
+    return response;
   }
+  auto if_match = read_tags(request.headers, "If-Match");
+  if (!if_match) return problem_response(if_match.error(), request.request_id);
+  auto if_none_match = read_tags(request.headers, "If-None-Match");
+  if (!if_none_match) return problem_response(if_none_match.error(), request.request_id);
   try {
-    return endpoint.handler(context, Call{request, std::move(*query), media});
+    const Call call{request, std::move(*query), media, std::move(*if_match), std::move(*if_none_match)};
+    http::Response response = endpoint.handler(context, call);
+    if (!response.later) apply_conditions(endpoint, call, response);
+    return response;
   } catch (const Stopped&) {
     return problem_response(
         {ErrorCode::kUnavailable, "the server is ending; the work was given up, nothing was stored"},
@@ -56,14 +78,19 @@ std::optional<http::Response> answer_now(const Endpoint& endpoint, Context& cont
   return job_answer(*text);
 }
 
-Api::Api(JobService& jobs, ApiConfig config) {
+http::Access access_of(const Endpoint& endpoint) {
+  return endpoint.access.value_or(endpoint.method == "GET" ? http::Access::kRead : http::Access::kSubmit);
+}
+
+Api::Api(JobService& jobs, http::TokenTable& tokens, ApiConfig config) {
   const SpecLimits limits{config.jobs.cells_max};
-  context_ = std::unique_ptr<Context>(new Context{jobs, std::move(config), false, {}, {}});
-  context_->job_texts = std::make_shared<JobTexts>(jobs);
+  context_ = std::unique_ptr<Context>(new Context{jobs, tokens, std::move(config), false, {}, {}});
+  context_->job_texts = std::make_shared<JobTexts>(jobs, context_->config.base_path);
   context_->feeds = std::make_shared<Feeds>(jobs);
   context_->schema_text = to_text(job_spec_schema(limits));
-  context_->openapi_text =
-      to_text(openapi_document(endpoints(), limits, context_->config.version, context_->config.base_path));
+  const Json openapi = openapi_document(endpoints(), limits, context_->config.version, context_->config.base_path);
+  context_->openapi_text = to_text(openapi);
+  context_->docs_text = docs_page(openapi, context_->config.base_path);
 }
 
 Api::~Api() { drain(); }
@@ -86,11 +113,12 @@ void Api::add_routes(http::Router& router) {
     for (std::size_t open = pattern.find('{'); open != std::string::npos; open = pattern.find('{', open + 1)) {
       pattern.replace(open, pattern.find('}', open) - open + 1, "{}");
     }
+    if (endpoint.method == "POST" || endpoint.method == "PATCH") router.advertise(pattern, accept_name(endpoint), body_offer(endpoint));
     router.add(std::string(endpoint.method), pattern,
                [&endpoint, context = context_.get()](const http::Request& request) {
                  return run_endpoint(endpoint, *context, request);
                },
-               endpoint.is_heavy ? http::Router::Weight::kHeavy : http::Router::Weight::kLight);
+               endpoint.is_heavy ? http::Router::Weight::kHeavy : http::Router::Weight::kLight, access_of(endpoint));
     if (endpoint.handler == &get_job) {
       router.set_ready("GET", pattern, [&endpoint, context = context_.get()](const http::Request& request) {
         return answer_now(endpoint, *context, request);
@@ -101,6 +129,12 @@ void Api::add_routes(http::Router& router) {
 
 http::Response failure(const Error& error, const Call& call) {
   return problem_response(error, call.request.request_id);
+}
+
+http::Response job_response(const Context& context, int status, const JobView& view) {
+  http::Response response = json_response(status, encode_job(view, context.config.base_path));
+  stamp(response, job_tag(view.job));
+  return response;
 }
 
 http::Response json_response(int status, const Json& body) {

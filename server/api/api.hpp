@@ -8,6 +8,7 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
@@ -15,9 +16,11 @@
 #include <vector>
 
 #include "server/api/codec_spec.hpp"
+#include "server/api/conditional.hpp"
 #include "server/api/problems.hpp"
 #include "server/api/query.hpp"
 #include "server/http/router.hpp"
+#include "server/http/tokens.hpp"
 #include "server/jobs/analysis_worker.hpp"
 #include "server/jobs/service.hpp"
 
@@ -62,6 +65,7 @@ class JobTexts;
 /// What handlers work with.
 struct Context {
   JobService& jobs;
+  http::TokenTable& tokens;
   const ApiConfig config;
   std::atomic<bool> draining{false};  // asks long computations to give up, too
   std::string schema_text;            // made once
@@ -71,6 +75,9 @@ struct Context {
   // Not shared: a unique_ptr would have to know the class here.
   std::shared_ptr<JobTexts> job_texts = {};  // answers of GET, kept
   std::shared_ptr<Feeds> feeds = {};         // of the streams, which all end before it
+  std::atomic<std::size_t> waiting{0};  // requests that wait for a job to change
+  std::string docs_text = {};           // the page of /docs, made once
+  std::mutex tokens_mutex = {};  // a change of the stored tokens and of `tokens` is one
 };
 
 /// A request that has passed the table's checks.
@@ -78,8 +85,17 @@ struct Call {
   const http::Request& request;
   Query query;
   std::string_view media;  // the media type to answer with
+  std::optional<TagList> if_match = {}, if_none_match = {};
   /// The job id of the path.
   const std::string& id() const { return request.path_params.at(0); }
+};
+
+/// What the ETag of an answer is made of. Only answers with one can be 304.
+enum class Validator {
+  kNone,
+  kJob,      // revision and last_seq
+  kHistory,  // the history asked for, the query, the media type and the program: known before the work
+  kBody      // the bytes of the answer: saves sending it, not making it
 };
 
 /// One row per operation; handlers, query checks, content negotiation and openapi.json all follow it.
@@ -99,15 +115,23 @@ struct Endpoint {
   /// What a POST takes; empty: application/json. None of them can be sent by a page of another site without asking first: only text/plain and
   /// the two form types can (CORS safelist), so exactly these are demanded.
   std::vector<std::string_view> body_media = {};
+  Validator validator = Validator::kNone;
+  /// What it needs where tokens are required; nullopt: read for GET, submit for all else. So only the exceptions are written down.
+  std::optional<http::Access> access = std::nullopt;
 };
+
+http::Access access_of(const Endpoint& endpoint);
 
 std::span<const Endpoint> endpoints();
 /// Rows of the table that stand beside their handlers (handlers_fork.cpp).
 std::vector<Endpoint> fork_endpoints();
+/// The part of it in endpoints_pages.cpp.
+std::vector<Endpoint> further_endpoints();
 
 class Api {
  public:
-  Api(JobService& jobs, ApiConfig config);
+  /// `tokens`: the table that admission asks; kept the same as the stored ones. Both outlive it.
+  Api(JobService& jobs, http::TokenTable& tokens, ApiConfig config);
   ~Api();
   /// Takes up analyses that are queued. Before it, and without it, they wait.
   Status start();
@@ -128,13 +152,26 @@ http::Response run_endpoint(const Endpoint& endpoint, Context& context, const ht
 std::optional<http::Response> answer_now(const Endpoint& endpoint, Context& context, const http::Request& request);
 
 http::Response json_response(int status, const Json& body);
+/// Of what is made of the colony at `at_h` of the query: the answer that needs no work (304, HEAD, or why there is none).
+std::optional<http::Response> settled_by_history(Context& context, const Call& call, std::string_view more = {});
+/// The tag of what was made of this colony; that of settled_by_history, unless the job went on between the two.
+std::string history_tag(const Context& context, const Call& call, const ColonyAt& at, std::string_view more = {});
+/// A job as the answer, with its tag.
+http::Response job_response(const Context& context, int status, const JobView& view);
 http::Response failure(const Error& error, const Call& call);
+/// 412 if the request names revisions of this job by If-Match and it has none of them; also the job's own failure.
+std::optional<http::Response> refused_by_if_match(Context& context, const Call& call);
+http::Response no_such_revision(const Call& call, const JobRow& job);
 
 // One function per endpoint.
 http::Response post_job(Context& context, const Call& call);
 http::Response get_jobs(Context& context, const Call& call);
 http::Response get_job_counts(Context& context, const Call& call);
 http::Response get_job(Context& context, const Call& call);
+http::Response patch_job(Context& context, const Call& call);
+http::Response get_stream(Context& context, const Call& call);
+http::Response get_docs(Context& context, const Call& call);
+http::Response get_docs_style(Context& context, const Call& call);
 http::Response cancel_job(Context& context, const Call& call);
 http::Response pause_job(Context& context, const Call& call);
 http::Response resume_job(Context& context, const Call& call);
@@ -165,6 +202,9 @@ http::Response get_comparison_figure(Context& context, const Call& call);
 http::Response get_job_schema(Context& context, const Call& call);
 http::Response get_openapi(Context& context, const Call& call);
 http::Response get_service_info(Context& context, const Call& call);
+http::Response post_token(Context& context, const Call& call);
+http::Response get_tokens(Context& context, const Call& call);
+http::Response delete_token(Context& context, const Call& call);
 http::Response get_healthz(Context& context, const Call& call);
 http::Response get_readyz(Context& context, const Call& call);
 

@@ -186,9 +186,9 @@ MatchRequest decode_match_request(const std::string& options_json) {
   return match;
 }
 
-Json encode_analysis(const AnalysisRow& row, bool with_result) {
+Json encode_analysis(const AnalysisRow& row, bool with_result, std::string_view base_path) {
   const bool is_comparison = row.kind == AnalysisKind::kComparison;
-  const std::string self = (is_comparison ? "/v1/comparisons/" : "/v1/analyses/") + row.id;
+  const std::string self = std::string(base_path) + (is_comparison ? "/v1/comparisons/" : "/v1/analyses/") + row.id;
   Json out = {{"id", row.id},
               {"kind", name_of(row.kind)},
               {"name", row.name},

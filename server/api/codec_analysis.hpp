@@ -5,6 +5,7 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "engine/base/result.hpp"
 #include "server/api/compare.hpp"
@@ -25,8 +26,8 @@ Result<ComparisonSpec> decode_comparison_spec(const Json& body);
 Json encode_match_request(const MatchRequest& match);
 MatchRequest decode_match_request(const std::string& options_json);
 
-/// The member `result` is left out of lists.
-Json encode_analysis(const AnalysisRow& row, bool with_result);
+/// The member `result` is left out of lists. `base_path`: what the links begin with.
+Json encode_analysis(const AnalysisRow& row, bool with_result, std::string_view base_path);
 
 /// Schemas by component name.
 Json analysis_components();

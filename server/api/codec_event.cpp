@@ -119,8 +119,8 @@ Json encode_before_spec(const JobRow& job) {
           {"result", json_or_null(job.result_json)}};
 }
 
-Json encode_after_spec(const JobView& view) {
-  const std::string self = "/v1/jobs/" + view.job.id;
+Json encode_after_spec(const JobView& view, std::string_view base_path) {
+  const std::string self = std::string(base_path) + "/v1/jobs/" + view.job.id;
   return {{"progress", encode_progress(view.progress)},
           {"links",
            {{"self", self},
@@ -136,24 +136,25 @@ Json encode_after_spec(const JobView& view) {
 
 }  // namespace
 
-Json encode_job(const JobView& view) {
+Json encode_job(const JobView& view, std::string_view base_path) {
   Json out = encode_before_spec(view.job);
   out["spec"] = Json::parse(view.job.spec_json);
-  out.update(encode_after_spec(view));
+  out.update(encode_after_spec(view, base_path));
   return out;
 }
 
-void append_job_text(std::string& out, const JobView& view) {
+void append_job_text(std::string& out, const JobView& view, std::string_view base_path) {
   out += to_text(encode_before_spec(view.job));
   out.back() = ',';
   (out += "\"spec\":") += view.job.spec_json;
   const std::size_t joint = out.size();
-  out += to_text(encode_after_spec(view));
+  out += to_text(encode_after_spec(view, base_path));
   out[joint] = ',';
 }
 
 Json encode_log_row(const LogRow& row) {
-  return {{"index", row.index}, {"at", row.at}, {"level", row.level}, {"message", row.message}};
+  return {{"index", row.index}, {"at", row.at}, {"level", row.level}, {"message", row.message},
+          {"actor", row.actor.empty() ? Json(nullptr) : Json(row.actor)}};
 }
 
 }  // namespace colony::server::api

@@ -26,9 +26,10 @@ Json encode_row(std::span<const Column<Row>> columns, const Row& row) {
 Json encode_cell(const Cell& cell);
 Json encode_event(const Event& event);
 Json encode_progress(const Progress& progress);
-Json encode_job(const JobView& view);
+/// `base_path`: what the links begin with.
+Json encode_job(const JobView& view, std::string_view base_path);
 /// The text of encode_job. Its spec is not read: it is stored in the form in which it is answered.
-void append_job_text(std::string& out, const JobView& view);
+void append_job_text(std::string& out, const JobView& view, std::string_view base_path);
 Json encode_log_row(const LogRow& row);
 
 }  // namespace colony::server::api

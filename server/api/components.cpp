@@ -3,6 +3,8 @@
 
 #include "server/api/codec_analysis.hpp"
 #include "server/api/codec_event.hpp"
+#include "server/api/codec_patch.hpp"
+#include "server/api/handlers_tokens.hpp"
 #include "server/api/codec_report.hpp"
 #include "server/api/problems.hpp"
 #include "server/api/schema.hpp"
@@ -251,6 +253,11 @@ Json component_schemas(const SpecLimits& limits) {
   Json job_spec = job_spec_schema(limits);
   job_spec.erase("$schema");
   job_spec.erase("$id");
+  job_spec["examples"] = Json::array({{{"name", "AHH-1 at 37 C"},
+                                       {"labels", {{"plate", "7"}}},
+                                       {"seed", 1},
+                                       {"until", {{"time_h", 240}, {"cells", 2000}}},
+                                       {"model", {{"cycle", {{"mean_h", 12}, {"sd_h", 2}}}}}}});
   Json activity = names_upto(Activity::kSenescent);
   Json cell = row_schema(cell_columns());
   cell["properties"]["activity"] = std::move(activity);
@@ -262,6 +269,7 @@ Json component_schemas(const SpecLimits& limits) {
       {"VerifyResult", verify_result_schema()},
       {"Origin", origin_schema()},
       {"Job", job_schema()},
+      {"JobPatch", job_patch_schema()},
       {"Submission", submission_schema()},
       {"JobList", page_of("Job", nullable("string"))},
       {"JobCounts", counts_schema()},
@@ -283,12 +291,14 @@ Json component_schemas(const SpecLimits& limits) {
       {"LogLine", strict_object({{"index", count()},
                                  {"at", wall_time(false)},
                                  {"level", {{"enum", Json::array({"info", "warning", "error"})}}},
-                                 {"message", typed("string")}})},
+                                 {"message", typed("string")},
+                                 {"actor", nullable("string")}})},
       {"ServiceInfo", service_info_schema()},
       {"Health", strict_object({{"status", typed("string")}})},
       {"Problem", problem_schema()}};
   components.update(report_components());
   components.update(analysis_components());
+  components.update(token_components());
   return components;
 }
 

@@ -3,6 +3,7 @@
 
 #include "engine/picture/mesh.hpp"
 #include "server/api/api.hpp"
+#include "server/api/endpoints_service.hpp"
 #include "server/api/measure.hpp"
 
 namespace colony::server::api {
@@ -67,7 +68,7 @@ std::vector<Endpoint> make_endpoints() {
        {{200, "a page"}},
        "JobList",
        {},
-       get_jobs},
+       get_jobs, false, {}, Validator::kBody},
       {"GET",
        "/v1/jobs/counts",
        "countJobs",
@@ -77,8 +78,10 @@ std::vector<Endpoint> make_endpoints() {
        {{200, "the counts"}},
        "JobCounts",
        {},
-       get_job_counts},
-      {"GET", "/v1/jobs/{job_id}", "showJob", "One job", {kJson}, {}, {{200, "the job"}}, "Job", {kNotFound}, get_job},
+       get_job_counts, false, {}, Validator::kBody},
+      {"GET", "/v1/jobs/{job_id}", "showJob",
+       "One job. With If-None-Match and `Prefer: wait=N` it is answered when its revision differs from those, at the latest after N s",
+       {kJson}, {}, {{200, "the job"}}, "Job", {kNotFound}, get_job, false, {}, Validator::kJob},
       {"POST",
        "/v1/jobs/{job_id}/cancel",
        "cancelJob",
@@ -87,7 +90,7 @@ std::vector<Endpoint> make_endpoints() {
        {},
        {{200, "it was cancelled already"}, {202, "it is cancelled, or will be at its next event"}},
        "Job",
-       {kMalformed, kNotFound, kJobTerminal, kUnsupportedMediaType},
+       {kMalformed, kNotFound, kJobTerminal, kUnsupportedMediaType, kPreconditionFailed},
        cancel_job},
       {"POST",
        "/v1/jobs/{job_id}/pause",
@@ -97,7 +100,7 @@ std::vector<Endpoint> make_endpoints() {
        {},
        {{200, "it was paused already"}, {202, "it is paused, or will be at its next event"}},
        "Job",
-       {kMalformed, kNotFound, kJobTerminal, kUnsupportedMediaType},
+       {kMalformed, kNotFound, kJobTerminal, kUnsupportedMediaType, kPreconditionFailed},
        pause_job},
       {"POST",
        "/v1/jobs/{job_id}/resume",
@@ -107,7 +110,7 @@ std::vector<Endpoint> make_endpoints() {
        {},
        {{200, "it was queued or running already"}, {202, "it is queued"}},
        "Job",
-       {kMalformed, kNotFound, kJobTerminal, kUnsupportedMediaType},
+       {kMalformed, kNotFound, kJobTerminal, kUnsupportedMediaType, kPreconditionFailed},
        resume_job},
       {"DELETE",
        "/v1/jobs/{job_id}",
@@ -117,7 +120,7 @@ std::vector<Endpoint> make_endpoints() {
        {},
        {{204, "it is gone"}},
        "",
-       {kNotFound, kJobNotTerminal},
+       {kNotFound, kJobNotTerminal, kPreconditionFailed},
        delete_job},
       {"GET",
        "/v1/jobs/{job_id}/events",
@@ -137,7 +140,7 @@ std::vector<Endpoint> make_endpoints() {
        {{200, "events"}, {204, "a stream taken up again with nothing left"}},
        "Event",
        {kNotFound},
-       get_events},
+       get_events, false, {}, Validator::kHistory},
       {"GET",
        "/v1/jobs/{job_id}/cells",
        "listCells",
@@ -148,7 +151,7 @@ std::vector<Endpoint> make_endpoints() {
        "Cell",
        {kNotFound, kTimeNotReached},
        get_cells,
-       true},
+       true, {}, Validator::kHistory},
       {"GET",
        "/v1/jobs/{job_id}/series",
        "listSeries",
@@ -159,7 +162,7 @@ std::vector<Endpoint> make_endpoints() {
        "Series",
        {kNotFound},
        get_series,
-       true},
+       true, {}, Validator::kHistory},
       {"GET",
        "/v1/jobs/{job_id}/lineage",
        "showLineage",
@@ -170,7 +173,7 @@ std::vector<Endpoint> make_endpoints() {
        "Lineage",
        {kNotFound, kTimeNotReached},
        get_lineage,
-       true},
+       true, {}, Validator::kHistory},
       {"GET",
        "/v1/jobs/{job_id}/image",
        "drawImage",
@@ -188,7 +191,7 @@ std::vector<Endpoint> make_endpoints() {
        "",
        {kNotFound, kTimeNotReached, kLimit},
        get_image,
-       true},
+       true, {}, Validator::kHistory},
       {"GET",
        "/v1/jobs/{job_id}/mesh",
        "getMesh",
@@ -201,7 +204,7 @@ std::vector<Endpoint> make_endpoints() {
        "",
        {kNotFound, kTimeNotReached, kLimit},
        get_mesh,
-       true},
+       true, {}, Validator::kHistory},
       {"GET",
        "/v1/jobs/{job_id}/analysis",
        "measureJob",
@@ -214,7 +217,7 @@ std::vector<Endpoint> make_endpoints() {
        "JobAnalysis",
        {kNotFound, kTimeNotReached, kLimit},
        get_analysis_of_job,
-       true},
+       true, {}, Validator::kHistory},
       {"GET",
        "/v1/jobs/{job_id}/log",
        "readLog",
@@ -246,7 +249,7 @@ std::vector<Endpoint> make_endpoints() {
        {{200, "a page"}},
        "AnalysisList",
        {},
-       get_analyses},
+       get_analyses, false, {}, Validator::kBody},
       {"GET",
        "/v1/analyses/{analysis_id}",
        "showAnalysis",
@@ -256,7 +259,7 @@ std::vector<Endpoint> make_endpoints() {
        {{200, "the analysis"}},
        "Analysis",
        {kNotFound},
-       get_analysis},
+       get_analysis, false, {}, Validator::kBody},
       {"DELETE",
        "/v1/analyses/{analysis_id}",
        "deleteAnalysis",
@@ -288,7 +291,7 @@ std::vector<Endpoint> make_endpoints() {
        "",
        {kMalformed, kNotFound, kLimit},
        get_analysis_step,
-       true},
+       true, {}, Validator::kHistory},
       {"POST",
        "/v1/comparisons",
        "compare",
@@ -309,7 +312,7 @@ std::vector<Endpoint> make_endpoints() {
        {{200, "a page"}},
        "ComparisonList",
        {},
-       get_comparisons},
+       get_comparisons, false, {}, Validator::kBody},
       {"GET",
        "/v1/comparisons/{comparison_id}",
        "showComparison",
@@ -319,7 +322,7 @@ std::vector<Endpoint> make_endpoints() {
        {{200, "the comparison"}},
        "Comparison",
        {kNotFound},
-       get_comparison},
+       get_comparison, false, {}, Validator::kBody},
       {"DELETE",
        "/v1/comparisons/{comparison_id}",
        "deleteComparison",
@@ -340,38 +343,7 @@ std::vector<Endpoint> make_endpoints() {
        "",
        {kMalformed, kNotFound, kTimeNotReached, kLimit},
        get_comparison_figure,
-       true},
-      {"GET",
-       "/v1/schema/job",
-       "getJobSchema",
-       "JSON Schema (2020-12) of a job spec",
-       {kJson, "application/schema+json"},
-       {},
-       {{200, "the schema"}},
-       "",
-       {},
-       get_job_schema},
-      {"GET",
-       "/openapi.json",
-       "getOpenapi",
-       "This description",
-       {kJson}, {}, {{200, "the description"}}, "", {}, get_openapi},
-      {"GET",
-       "/v1/service-info",
-       "getServiceInfo",
-       "Version, limits, presets and parameters",
-       {kJson},
-       {},
-       {{200, "facts"}},
-       "ServiceInfo",
-       {},
-       get_service_info},
-      {"GET", "/healthz", "getHealth", "Alive", {kJson}, {}, {{200, "alive"}}, "Health", {}, get_healthz},
-      {"GET",
-       "/readyz",
-       "getReadiness",
-       "Ready: database writable, disk free, not draining",
-       {kJson}, {}, {{200, "ready"}}, "Health", {}, get_readyz},
+       true, {}, Validator::kHistory},
   };
 }
 
@@ -379,9 +351,11 @@ std::vector<Endpoint> make_endpoints() {
 
 std::span<const Endpoint> endpoints() {
   static const std::vector<Endpoint> table = [] {
-    std::vector<Endpoint> rows = make_endpoints();
-    for (Endpoint& row : fork_endpoints()) rows.push_back(std::move(row));
-    return rows;
+    std::vector<Endpoint> all = make_endpoints();
+    for (Endpoint& row : fork_endpoints()) all.push_back(std::move(row));
+    for (Endpoint& further : further_endpoints()) all.push_back(std::move(further));
+    for (Endpoint& endpoint : service_endpoints()) all.push_back(std::move(endpoint));
+    return all;
   }();
   return table;
 }

@@ -113,7 +113,7 @@ Json job_example() {
   view.job.engine_version = "0.1.0/1";
   view.job.spec_json = to_text(encode_spec(*spec));
   view.progress = {2, 11.5, 2, 2, 0, 0, 0.0479166, 850.0, 2.35};
-  return encode_job(view);
+  return encode_job(view, "");
 }
 
 Json series_example() {

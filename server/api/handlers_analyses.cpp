@@ -126,9 +126,9 @@ http::Response created(Context& context, const Call& call, const NewAnalysis& an
   if (!row) return failure(row.error(), call);
   const bool is_done = row->state == AnalysisState::kSucceeded;
   if (!is_done && context.worker) context.worker->nudge();
-  const Json body = encode_analysis(*row, true);
+  const Json body = encode_analysis(*row, true, context.config.base_path);
   http::Response response = json_response(is_done ? 201 : 202, body);
-  response.headers.set("Location", context.config.base_path + body["links"]["self"].get<std::string>());
+  response.headers.set("Location", body["links"]["self"].get<std::string>());
   return response;
 }
 
@@ -142,8 +142,11 @@ http::Response listed(Context& context, const Call& call, AnalysisKind kind) {
   const auto page = context.jobs.store().analyses().list(kind, limit, cursor.value_or(""));
   if (!page) return failure(page.error(), call);
   Json items = Json::array();
-  for (const AnalysisRow& row : page->items) items.push_back(encode_analysis(row, false));
-  return json_response(200, {{"items", std::move(items)}, {"next", page->next ? Json(*page->next) : Json(nullptr)}});
+  for (const AnalysisRow& row : page->items) items.push_back(encode_analysis(row, false, context.config.base_path));
+  http::Response response =
+      json_response(200, {{"items", std::move(items)}, {"next", page->next ? Json(*page->next) : Json(nullptr)}});
+  if (page->next) set_next_link(context, call, response, "cursor", *page->next);
+  return response;
 }
 
 http::Response removed(Context& context, const Call& call, AnalysisKind kind) {
@@ -159,7 +162,7 @@ http::Response get_analyses(Context& context, const Call& call) {
 }
 http::Response get_analysis(Context& context, const Call& call) {
   const auto row = context.jobs.store().analyses().find(AnalysisKind::kAnalysis, call.id());
-  return row ? json_response(200, encode_analysis(*row, true)) : failure(row.error(), call);
+  return row ? json_response(200, encode_analysis(*row, true, context.config.base_path)) : failure(row.error(), call);
 }
 http::Response delete_analysis(Context& context, const Call& call) {
   return removed(context, call, AnalysisKind::kAnalysis);
@@ -185,14 +188,18 @@ http::Response get_analysis_step(Context& context, const Call& call) {
   AnalysisStore& store = context.jobs.store().analyses();
   const auto row = store.find(AnalysisKind::kAnalysis, call.id());
   if (!row) return failure(row.error(), call);
+  // An analysis has one image and one set of options for ever.
+  const std::string& step = call.request.path_params.at(1);
+  const std::string tag = derived_tag(context, call, Digest{}, 0, row->id + " " + row->options_json + " " + step);
+  if (auto settled = settled_by_tag(call, tag)) return std::move(*settled);
   const auto image = store.image(call.id());
   if (!image) return failure(image.error(), call);
-  auto png = step_png(*image, decode_image_options(row->options_json), call.request.path_params.at(1),
-                      effort_of(context));
+  auto png = step_png(*image, decode_image_options(row->options_json), step, effort_of(context));
   if (!png) return failure(as_body_error(png.error()), call);
   http::Response response;
   response.headers.set("Content-Type", call.media);
   response.body = std::move(*png);
+  stamp(response, tag);
   return response;
 }
 

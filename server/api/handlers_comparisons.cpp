@@ -118,7 +118,7 @@ http::Response get_comparisons(Context& context, const Call& call) {
 }
 http::Response get_comparison(Context& context, const Call& call) {
   const auto row = context.jobs.store().analyses().find(AnalysisKind::kComparison, call.id());
-  return row ? json_response(200, encode_analysis(*row, true)) : failure(row.error(), call);
+  return row ? json_response(200, encode_analysis(*row, true, context.config.base_path)) : failure(row.error(), call);
 }
 http::Response delete_comparison(Context& context, const Call& call) {
   return removed(context, call, AnalysisKind::kComparison);
@@ -127,11 +127,18 @@ http::Response delete_comparison(Context& context, const Call& call) {
 http::Response get_comparison_figure(Context& context, const Call& call) {
   const auto row = context.jobs.store().analyses().find(AnalysisKind::kComparison, call.id());
   if (!row) return failure(row.error(), call);
+  const auto source = context.jobs.store().analyses().find(AnalysisKind::kAnalysis, row->analysis_id);
+  if (!source) return failure(source.error(), call);
+  const auto moment = context.jobs.moment(row->job_id, Json::parse(row->options_json)["at_h"].get<double>());
+  if (!moment) return failure(moment.error(), call);
+  const std::string tag = derived_tag(context, call, moment->digest, moment->seq, row->id + " " + source->options_json);
+  if (auto settled = settled_by_tag(call, tag)) return std::move(*settled);
   const auto comparison = compare_again(context, *row, effort_of(context), Sweep::kLeaveOut);
   if (!comparison) return failure(comparison.error(), call);
   http::Response response;
   response.headers.set("Content-Type", call.media);
   response.body = comparison_figure(*comparison);
+  stamp(response, tag);
   return response;
 }
 

@@ -11,22 +11,6 @@
 namespace colony::server::api {
 namespace {
 
-std::string percent_encoded(std::string_view text) {
-  constexpr std::string_view kHex = "0123456789ABCDEF";
-  std::string out;
-  for (const char c : text) {
-    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
-                       c == '_' || c == '.' || c == '~';
-    if (plain) {
-      out += c;
-    } else {
-      const auto byte = static_cast<unsigned char>(c);
-      out += {'%', kHex[byte >> 4], kHex[byte & 15]};
-    }
-  }
-  return out;
-}
-
 Result<std::vector<std::pair<std::string, std::string>>> label_filters(const Query& query) {
   std::vector<std::pair<std::string, std::string>> labels;
   for (const std::string& text : query.texts("label")) {
@@ -59,12 +43,13 @@ class ManyFounders {
 };
 
 http::Response command(Context& context, const Call& call,
-                       Result<JobService::Commanded> (JobService::*method)(const std::string&)) {
+                       Result<JobService::Commanded> (JobService::*method)(const std::string&, const std::string&)) {
   if (const Status arguments = check_no_arguments(call.request.body); !arguments)
     return failure(arguments.error(), call);
-  const auto done = (context.jobs.*method)(call.id());
+  if (auto refused = refused_by_if_match(context, call)) return std::move(*refused);
+  const auto done = (context.jobs.*method)(call.id(), call.request.principal.name);
   if (!done) return failure(done.error(), call);
-  return json_response(done->changed ? 202 : 200, encode_job(done->view));
+  return job_response(context, done->changed ? 202 : 200, done->view);
 }
 
 }  // namespace
@@ -97,6 +82,7 @@ http::Response post_job(Context& context, const Call& call) {
                                {"estimate", encode_estimate(estimate(spec->run, context.config.jobs.threads_per_job))}});
   }
   NewJob job = new_job(*spec);
+  job.submitted_by = call.request.principal.name;
   job.idempotency_key = *key;
   job.body_hash = hash_of_body("", call.request.body);
   const auto submitted = context.jobs.submit(job);
@@ -125,16 +111,10 @@ http::Response get_jobs(Context& context, const Call& call) {
   response.body = "{\"items\":[";
   for (const JobView& view : page->items) {
     if (&view != &page->items.front()) response.body += ',';
-    append_job_text(response.body, view);
+    append_job_text(response.body, view, context.config.base_path);
   }
   response.body += "],\"next\":" + to_text(page->next ? Json(*page->next) : Json(nullptr)) + "}";
-  if (page->next) {
-    std::string target = context.config.base_path + "/v1/jobs?";
-    for (const auto& [name, value] : call.request.query) {
-      if (name != "cursor") target += percent_encoded(name) + "=" + percent_encoded(value) + "&";
-    }
-    response.headers.set("Link", "<" + target + "cursor=" + percent_encoded(*page->next) + ">; rel=\"next\"");
-  }
+  if (page->next) set_next_link(context, call, response, "cursor", *page->next);
   return response;
 }
 
@@ -146,16 +126,12 @@ http::Response get_job_counts(Context& context, const Call& call) {
   return json_response(200, body);
 }
 
-http::Response get_job(Context& context, const Call& call) {
-  const auto text = context.job_texts->read(call.id());
-  return text ? job_answer(**text) : failure(text.error(), call);
-}
-
 http::Response cancel_job(Context& context, const Call& call) { return command(context, call, &JobService::cancel); }
 http::Response pause_job(Context& context, const Call& call) { return command(context, call, &JobService::pause); }
 http::Response resume_job(Context& context, const Call& call) { return command(context, call, &JobService::resume); }
 
 http::Response delete_job(Context& context, const Call& call) {
+  if (auto refused = refused_by_if_match(context, call)) return std::move(*refused);
   const Status removed = context.jobs.remove(call.id());
   if (!removed) {
     // The one conflict that is not about an ended job.

@@ -3,6 +3,7 @@
 #include "server/api/api.hpp"
 #include "server/api/measure.hpp"
 #include "server/api/codec_model.hpp"
+#include "server/api/docs.hpp"
 #include "server/api/schema.hpp"
 
 namespace colony::server::api {
@@ -36,6 +37,17 @@ http::Response get_job_schema(Context& context, const Call& call) {
 }
 http::Response get_openapi(Context& context, const Call& call) {
   return text_response(call.media, context.openapi_text);
+}
+
+http::Response get_docs(Context& context, const Call& call) {
+  http::Response response = text_response(std::string(call.media) + "; charset=utf-8", context.docs_text);
+  // The page is text and one style: nothing else may run or be fetched.
+  response.headers.set("Content-Security-Policy",
+                       "default-src 'none'; style-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'");
+  return response;
+}
+http::Response get_docs_style(Context&, const Call& call) {
+  return text_response(std::string(call.media) + "; charset=utf-8", std::string(docs_style()));
 }
 
 http::Response get_service_info(Context& context, const Call&) {

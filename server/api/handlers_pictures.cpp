@@ -34,10 +34,11 @@ Status read_scale(const Query& query, std::int64_t width_default_px, PictureSpec
   return Ok{};
 }
 
-http::Response bytes_response(std::string_view media, std::string bytes) {
+http::Response bytes_response(std::string_view media, std::string bytes, const std::string& tag) {
   http::Response response;
   response.headers.set("Content-Type", media);
   response.body = std::move(bytes);
+  stamp(response, tag);
   return response;
 }
 
@@ -51,7 +52,12 @@ Result<GrowthPhases> growth_until(Context& context, const Call& call, double tim
 
 }  // namespace
 
-http::Response csv_response(std::string text) { return bytes_response("text/csv; charset=utf-8; header=present", std::move(text)); }
+http::Response csv_response(std::string text) {
+  http::Response response;
+  response.headers.set("Content-Type", content_type("text/csv"));
+  response.body = std::move(text);
+  return response;
+}
 
 http::Response get_image(Context& context, const Call& call) {
   PictureSpec spec;
@@ -70,29 +76,32 @@ http::Response get_image(Context& context, const Call& call) {
     }
     if (!errors.empty()) return failure({ErrorCode::kInvalid, "query parameters are wrong", std::move(errors)}, call);
   }
+  if (auto settled = settled_by_history(context, call)) return std::move(*settled);
   const auto at = context.jobs.colony_at(call.id(), call.query.number("at_h"));
   if (!at) return failure(at.error(), call);
+  const std::string tag = history_tag(context, call, *at);
   if (is_tiff) {
     MemoryFile file;
     const Status written = write_ome_tiff(*at->colony, at->spec->params, spec, {}, effort_of(context), file);
-    return written ? bytes_response(call.media, file.bytes()) : failure(written.error(), call);
+    return written ? bytes_response(call.media, file.bytes(), tag) : failure(written.error(), call);
   }
   std::string png;
   const Status drawn = render_png(*at->colony, at->spec->params, spec, effort_of(context),
                                   [&](std::string_view bytes) { png.append(bytes); });
-  return drawn ? bytes_response(call.media, std::move(png)) : failure(drawn.error(), call);
+  return drawn ? bytes_response(call.media, std::move(png), tag) : failure(drawn.error(), call);
 }
 
 http::Response get_mesh(Context& context, const Call& call) {
   MeshSpec spec;
   spec.triangles_max = static_cast<std::int64_t>(call.query.integer("triangles_max").value_or(kMeshTrianglesDefault));
   spec.nuclei = call.query.boolean("nuclei", true);
+  if (auto settled = settled_by_history(context, call)) return std::move(*settled);
   const auto at = context.jobs.colony_at(call.id(), call.query.number("at_h"));
   if (!at) return failure(at.error(), call);
   const auto mesh = build_mesh(*at->colony, at->spec->params.contact.rule, spec, effort_of(context));
   if (!mesh) return failure(mesh.error(), call);
   auto glb = encode_glb(*mesh, *at->colony);
-  return glb ? bytes_response(call.media, std::move(*glb)) : failure(glb.error(), call);
+  return glb ? bytes_response(call.media, std::move(*glb), history_tag(context, call, *at)) : failure(glb.error(), call);
 }
 
 http::Response get_analysis_of_job(Context& context, const Call& call) {
@@ -100,6 +109,11 @@ http::Response get_analysis_of_job(Context& context, const Call& call) {
   spec.side_max_px = kMeasuredSideMax_px;
   if (const Status scale = read_scale(call.query, kMeasuredWidthDefault_px, spec); !scale)
     return failure(scale.error(), call);
+  // The growth of it is read off the curve of the whole job.
+  const auto whole = context.jobs.moment(call.id(), std::nullopt);
+  if (!whole) return failure(whole.error(), call);
+  const std::string end = whole->digest.hex() + std::to_string(whole->seq);
+  if (auto settled = settled_by_history(context, call, end)) return std::move(*settled);
   const auto at = context.jobs.colony_at(call.id(), call.query.number("at_h"));
   if (!at) return failure(at.error(), call);
   if (at->colony->cells().empty()) {
@@ -110,7 +124,10 @@ http::Response get_analysis_of_job(Context& context, const Call& call) {
   if (!image) return failure(image.error(), call);
   if (call.media == "text/csv") {
     const auto rows = shape_rows(image->labels, *at->colony, image->left_um, image->top_um);
-    return rows ? csv_response(shape_csv(cell_shape_columns(), *rows)) : failure(rows.error(), call);
+    if (!rows) return failure(rows.error(), call);
+    http::Response table = csv_response(shape_csv(cell_shape_columns(), *rows));
+    stamp(table, history_tag(context, call, *at, end));
+    return table;
   }
   const auto report = measure_colony(*at, *image, effort);
   if (!report) return failure(report.error(), call);
@@ -120,7 +137,10 @@ http::Response get_analysis_of_job(Context& context, const Call& call) {
   body.update(encode_report(*report));
   body["packing"] = encode_packing(packing);
   body["growth"] = encode_growth(growth_until(context, call, at->time_h));
-  return json_response(200, body);
+  http::Response response = json_response(200, body);
+  const auto later = context.jobs.moment(call.id(), std::nullopt);
+  if (later && later->seq == whole->seq) stamp(response, history_tag(context, call, *at, end));
+  return response;
 }
 
 }  // namespace colony::server::api

@@ -14,10 +14,6 @@ Error wrong_parameter(std::string name, std::string message) {
   return {ErrorCode::kInvalid, "query parameters are wrong", {{std::move(name), std::move(message)}}};
 }
 
-std::string content_type(std::string_view media) {
-  return media == "text/csv" ? "text/csv; charset=utf-8; header=present" : std::string(media);
-}
-
 http::Response streamed(std::string_view media, std::unique_ptr<http::BodySource> source) {
   http::Response response;
   response.headers.set("Content-Type", content_type(media));
@@ -72,6 +68,7 @@ http::Response live_stream(Context& context, const Call& call, StreamWish wish) 
   http::Response response =
       streamed("text/event-stream", std::make_unique<EventStream>(context.jobs, *context.feeds, *view, std::move(wish)));
   response.headers.set("Cache-Control", "no-store");
+  response.headers.set("X-Accel-Buffering", "no");  // nginx would keep events back
   return response;
 }
 
@@ -88,50 +85,78 @@ http::Response get_events(Context& context, const Call& call) {
   }
   std::optional<std::size_t> limit = call.query.integer("limit");
   if (!limit && call.media == "application/json") limit = kEventsPerPageDefault;
+  const auto moment = context.jobs.moment(call.id(), std::nullopt);
+  if (!moment) return failure(moment.error(), call);
+  // Of a live job the same page can have one more event a moment later.
+  const bool is_fixed = is_terminal(moment->job.state);
+  const std::string tag = derived_tag(context, call, moment->digest, moment->seq);
+  if (is_fixed) {
+    if (auto settled = settled_by_tag(call, tag)) return std::move(*settled);
+  }
   auto first = context.jobs.events(call.id(), wish.filter, kEventsPerRead);
   if (!first) return failure(first.error(), call);
-  return streamed(call.media, std::make_unique<EventListSource>(context.jobs, call.id(), wish.filter, limit,
-                                                                event_format(call.media), std::move(*first)));
+  http::Response response = streamed(call.media, std::make_unique<EventListSource>(context.jobs, call.id(), wish.filter, limit,
+                                                                                   event_format(call.media), std::move(*first)));
+  if (is_fixed) stamp(response, tag);
+  if (limit) {
+    const auto end = context.jobs.page_end(call.id(), wish.filter, *limit);
+    if (!end) return failure(end.error(), call);
+    if (*end) set_next_link(context, call, response, "after", std::to_string(**end));
+  }
+  return response;
 }
 
 http::Response get_cells(Context& context, const Call& call) {
+  if (auto settled = settled_by_history(context, call)) return std::move(*settled);
   auto at = context.jobs.colony_at(call.id(), call.query.number("at_h"));
   if (!at) return failure(at.error(), call);
+  const std::string tag = history_tag(context, call, *at);
   const Json facts = {{"time_h", at->time_h}, {"last_seq", at->colony->last_seq()}, {"digest", at->digest.hex()}};
-  return streamed(call.media, std::make_unique<CellListSource>(std::move(*at), cell_format(call.media, facts)));
+  http::Response response =
+      streamed(call.media, std::make_unique<CellListSource>(std::move(*at), cell_format(call.media, facts)));
+  stamp(response, tag);
+  return response;
 }
 
 http::Response get_series(Context& context, const Call& call) {
+  const auto before = context.jobs.moment(call.id(), std::nullopt);
+  if (!before) return failure(before.error(), call);
+  const std::string tag = derived_tag(context, call, before->digest, before->seq);
+  if (auto settled = settled_by_tag(call, tag)) return std::move(*settled);
   const auto rows = context.jobs.series(call.id(), call.query.integer("points").value_or(kSeriesPointsDefault));
   if (!rows) return failure(rows.error(), call);
+  http::Response response;
   if (call.media == "text/csv") {
-    http::Response response;
     response.headers.set("Content-Type", content_type(call.media));
     append_csv_header(response.body, series_columns());
     for (const SeriesRow& row : *rows) append_csv_row(response.body, series_columns(), row);
-    return response;
+  } else {
+    Json items = Json::array();
+    for (const SeriesRow& row : *rows) items.push_back(encode_row(series_columns(), row));
+    response = json_response(200, {{"items", std::move(items)}, {"next", nullptr}});
   }
-  http::Response response;
-  response.headers.set("Content-Type", "application/json");
-  response.body = "{\"items\":[";
-  for (const SeriesRow& row : *rows) {
-    if (&row != &rows->front()) response.body += ',';
-    append_series_text(response.body, row);
-  }
-  response.body += "],\"next\":null}";
+  // The rows are of the job as it was when they were read: of one that went on meanwhile it cannot be said which.
+  const auto after = context.jobs.moment(call.id(), std::nullopt);
+  if (after && after->seq == before->seq) stamp(response, tag);
   return response;
 }
 
 http::Response get_lineage(Context& context, const Call& call) {
+  if (auto settled = settled_by_history(context, call)) return std::move(*settled);
   auto at = context.jobs.colony_at(call.id(), call.query.number("at_h"));
   if (!at) return failure(at.error(), call);
   auto lineage = read_lineage(context.jobs, call.id(), at->colony->last_seq(), &context.draining);
   if (!lineage) return failure(lineage.error(), call);
+  std::unique_ptr<http::BodySource> source;
   if (call.media != "application/json") {
-    return streamed(call.media, std::make_unique<NewickSource>(std::move(*lineage), at->time_h));
+    source = std::make_unique<NewickSource>(std::move(*lineage), at->time_h);
+  } else {
+    const Json facts = {{"time_h", at->time_h}, {"last_seq", at->colony->last_seq()}, {"digest", at->digest.hex()}};
+    source = std::make_unique<LineageTableSource>(std::move(*lineage), at->colony, facts);
   }
-  const Json facts = {{"time_h", at->time_h}, {"last_seq", at->colony->last_seq()}, {"digest", at->digest.hex()}};
-  return streamed(call.media, std::make_unique<LineageTableSource>(std::move(*lineage), at->colony, facts));
+  http::Response response = streamed(call.media, std::move(source));
+  stamp(response, history_tag(context, call, *at));
+  return response;
 }
 
 http::Response get_log(Context& context, const Call& call) {

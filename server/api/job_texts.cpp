@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "server/api/codec_event.hpp"
+#include "server/api/conditional.hpp"
 
 namespace colony::server::api {
 
@@ -10,6 +11,7 @@ http::Response job_answer(const JobText& text) {
   http::Response response;
   response.headers.set("Content-Type", "application/json");
   response.body = text.text;
+  stamp(response, text.tag);
   return response;
 }
 
@@ -28,9 +30,8 @@ Result<std::shared_ptr<const JobText>> JobTexts::read(const std::string& id) {
   const auto view = jobs_.show(id);
   if (!view) return view.error();
   auto text = std::make_shared<JobText>();
-  append_job_text(text->text, *view);
-  text->revision = view->job.revision;
-  text->last_seq = view->job.last_seq;
+  append_job_text(text->text, *view, base_path_);
+  text->tag = job_tag(view->job);
   if (text->text.size() > kJobTextBytesMax) return std::shared_ptr<const JobText>(std::move(text));
   const bool is_live = view->job.state == JobState::kRunning || view->job.state == JobState::kPaused;
   const auto until = is_live ? Clock::now() + kLiveTextAge : Clock::time_point::max();

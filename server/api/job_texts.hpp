@@ -14,6 +14,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <utility>
 
 #include "engine/base/result.hpp"
 #include "server/http/message.hpp"
@@ -27,14 +28,15 @@ inline constexpr std::chrono::milliseconds kLiveTextAge{100};
 
 struct JobText {
   std::string text;
-  std::uint64_t revision = 0, last_seq = 0;
+  std::string tag;  // job_tag
 };
 
 http::Response job_answer(const JobText& text);
 
 class JobTexts {
  public:
-  explicit JobTexts(JobService& jobs) : jobs_(jobs) {}
+  /// `base_path`: what the links begin with.
+  JobTexts(JobService& jobs, std::string base_path) : jobs_(jobs), base_path_(std::move(base_path)) {}
   /// Null: not known, or no longer true.
   std::shared_ptr<const JobText> find(const std::string& id);
   /// Found, or read and kept.
@@ -48,6 +50,7 @@ class JobTexts {
     Clock::time_point until;
   };
   JobService& jobs_;
+  const std::string base_path_;
   std::mutex mutex_;  // guards everything below
   std::map<std::string, Kept> kept_;
 };

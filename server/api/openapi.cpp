@@ -1,17 +1,20 @@
 #include "server/api/openapi.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 
 #include "server/api/examples.hpp"
+#include "server/api/openapi_headers.hpp"
 #include "server/api/schema.hpp"
 
 namespace colony::server::api {
 namespace {
 
-Json problem_answer(std::string_view description) {
+Json problem_answer(const Endpoint& endpoint, int status, std::string_view description) {
   return {{"description", description},
+          {"headers", problem_headers(endpoint, status)},
           {"content", {{"application/problem+json", {{"schema", reference("Problem")}}}}}};
 }
 
@@ -41,31 +44,6 @@ std::string path_parameter_text(const std::string& name) {
   return "id, a UUIDv7 in lower case";
 }
 
-// Groups of operations, by the first words of their paths that fit.
-struct Tag {
-  std::string_view name, prefix, description;
-};
-constexpr Tag kTags[] = {{"results", "/v1/jobs/{job_id}/", "what a job has grown"},
-                         {"jobs", "/v1/jobs", "growing colonies: submit, look, command"},
-                         {"pictures", "/v1/analyses", "real pictures, analysed"},
-                         {"comparisons", "/v1/comparisons", "a colony beside a picture"},
-                         {"service", "/", "the service itself"}};
-
-std::string_view tag_of(const Endpoint& endpoint) {
-  // A command is a matter of the job, not of its results.
-  if (endpoint.method == "POST" && endpoint.path.starts_with("/v1/jobs")) return "jobs";
-  for (const Tag& tag : kTags) {
-    if (endpoint.path.starts_with(tag.prefix)) return tag.name;
-  }
-  return "service";
-}
-
-Json tags() {
-  Json list = Json::array();
-  for (const Tag& tag : kTags) list.push_back({{"name", tag.name}, {"description", tag.description}});
-  return list;
-}
-
 Json parameters_of(const Endpoint& endpoint) {
   Json parameters = Json::array();
   if (endpoint.path.find("{job_id}") != std::string_view::npos)
@@ -93,19 +71,7 @@ Json parameters_of(const Endpoint& endpoint) {
     if (Json example = parameter_example(param); !example.is_null()) one["example"] = std::move(example);
     parameters.push_back(std::move(one));
   }
-  const auto header = [&](const char* name, const char* text, Json schema) {
-    parameters.push_back({{"name", name}, {"in", "header"}, {"description", text}, {"schema", std::move(schema)}});
-  };
-  const bool makes_job =
-      endpoint.operation_id == "submitJob" || endpoint.operation_id == "forkJob" || endpoint.operation_id == "verifyJob";
-  if (makes_job) {
-    header("Idempotency-Key", "the same key and body give the same job",
-           {{"type", "string"}, {"minLength", 1}, {"maxLength", kIdempotencyKeyBytesMax}, {"pattern", "^[ -~]+$"}});
-  }
-  if (endpoint.operation_id == "listEvents") {
-    header("Last-Event-ID", "text/event-stream: the last seq seen; of this and `after` the greater wins",
-           {{"type", "string"}, {"pattern", "^[0-9]+$"}});
-  }
+  add_header_parameters(endpoint, parameters);
   return parameters;
 }
 
@@ -131,24 +97,15 @@ Json success_answer(const Endpoint& endpoint, int status, std::string_view descr
       answer["content"][std::string(media)] = {{"schema", media_schema(endpoint, media)}};
     }
   }
-  const auto header = [&](const char* name, const char* text) {
-    answer["headers"][name] = {{"description", text}, {"schema", {{"type", "string"}}}};
-  };
-  if (endpoint.operation_id == "submitJob" || endpoint.operation_id == "forkJob" || endpoint.operation_id == "verifyJob")
-    header("Location", "path of the job");
-  if (status == 201 || status == 202) {
-    if (endpoint.operation_id == "analyseImage" || endpoint.operation_id == "compare") {
-      header("Location", "path of what was made");
-    }
-  }
-  if (endpoint.operation_id == "listJobs") header("Link", "rel=next, if there is a next page");
+  answer["headers"] = answer_headers(endpoint, status);
   return answer;
 }
 
 // What the request gate and the checks before a handler can answer to any request.
 const std::map<int, std::string_view>& common_problems() {
   static const std::map<int, std::string_view> table = {{400, "the request cannot be read"},
-                                                        {403, "a foreign Origin"},
+                                                        {401, "no token, or none that is known and valid; see WWW-Authenticate"},
+                                                        {403, "a foreign Origin, or a token whose scope does not allow this"},
                                                         {404, "there is no such thing"},
                                                         {405, "a method that the path does not have; see Allow"},
                                                         {408, "the request came too slowly"},
@@ -156,6 +113,7 @@ const std::map<int, std::string_view>& common_problems() {
                                                         {414, "the target is too long"},
                                                         {421, "a Host that is not ours"},
                                                         {422, "fields or parameters are wrong"},
+                                                        {429, "too many requests; see Retry-After"},
                                                         {431, "the header is too large"},
                                                         {500, "a bug in the server"},
                                                         {501, "a method or coding that is not implemented"},
@@ -177,9 +135,21 @@ Json responses_of(const Endpoint& endpoint) {
   for (const auto& [status, description] : endpoint.answers) {
     responses[std::to_string(status)] = success_answer(endpoint, status, description);
   }
-  for (const auto& [status, text] : problems) responses[std::to_string(status)] = problem_answer(text);
-  responses["default"] = problem_answer("any other problem");
+  if (endpoint.validator != Validator::kNone) {
+    problems[412] = problem_row(ProblemKind::kPreconditionFailed).title;
+    responses["304"] = {{"description", "the answer is as If-None-Match supposes"}, {"headers", answer_headers(endpoint, 304)}};
+  }
+  for (const auto& [status, text] : problems) responses[std::to_string(status)] = problem_answer(endpoint, status, text);
+  responses["default"] = problem_answer(endpoint, 0, "any other problem");
   return responses;
+}
+
+// Of a bearer scheme the roles that are needed are listed (OpenAPI 3.1, 4.8.30): the scope. A server without tokens asks for none.
+Json security_of(const Endpoint& endpoint) {
+  constexpr std::array<const char*, 4> kScopes = {"", "read", "submit", "admin"};
+  const http::Access access = access_of(endpoint);
+  if (access == http::Access::kOpen) return Json::array();
+  return Json::array({{{"token", Json::array({kScopes[static_cast<std::size_t>(access)]})}}});
 }
 
 Json request_body_of(const Endpoint& endpoint) {
@@ -189,8 +159,14 @@ Json request_body_of(const Endpoint& endpoint) {
   if (endpoint.operation_id == "forkJob") {
     return {{"required", true}, {"content", {{"application/json", {{"schema", reference("ForkSpec")}}}}}};
   }
+  if (endpoint.operation_id == "editJob") {
+    return {{"required", true}, {"content", {{"application/merge-patch+json", {{"schema", reference("JobPatch")}}}}}};
+  }
   if (endpoint.operation_id == "compare") {
     return {{"required", true}, {"content", {{"application/json", {{"schema", reference("ComparisonSpec")}}}}}};
+  }
+  if (endpoint.operation_id == "createToken") {
+    return {{"required", true}, {"content", {{"application/json", {{"schema", reference("NewToken")}}}}}};
   }
   if (!endpoint.body_media.empty()) {
     Json content = Json::object();
@@ -213,12 +189,13 @@ Json openapi_document(std::span<const Endpoint> table, const SpecLimits& limits,
     std::transform(method.begin(), method.end(), method.begin(),
                    [](char c) { return static_cast<char>(c - 'A' + 'a'); });
     Json operation = {
-        {"operationId", endpoint.operation_id}, {"summary", endpoint.summary}, {"parameters", parameters_of(endpoint)}};
-    operation["tags"] = Json::array({tag_of(endpoint)});
-    if (endpoint.method == "POST") operation["requestBody"] = request_body_of(endpoint);
+        {"operationId", endpoint.operation_id}, {"tags", Json::array({tag_of(endpoint)})},
+        {"summary", endpoint.summary}, {"parameters", parameters_of(endpoint)}};
+    if (endpoint.method == "POST" || endpoint.method == "PATCH") operation["requestBody"] = request_body_of(endpoint);
     if (const Json examples = request_examples(endpoint.operation_id); !examples.is_null()) {
       for (auto& [media, content] : operation["requestBody"]["content"].items()) content["examples"] = examples;
     }
+    operation["security"] = security_of(endpoint);
     operation["responses"] = responses_of(endpoint);
     paths[std::string(endpoint.path)][method] = std::move(operation);
   }
@@ -234,10 +211,17 @@ Json openapi_document(std::span<const Endpoint> table, const SpecLimits& limits,
              "documents (RFC 9457) that name every wrong field at once."}}},
           {"jsonSchemaDialect", "https://json-schema.org/draft/2020-12/schema"},
           {"servers", Json::array({{{"url", base_path.empty() ? "/" : base_path}}})},
-          {"tags", tags()},
+          {"tags", tag_list()},
           {"paths", std::move(paths)},
           {"components",
-           {{"parameters",
+           {{"securitySchemes",
+             {{"token",
+               {{"type", "http"},
+                {"scheme", "bearer"},
+                {"description",
+                 "A token with scope read, submit or admin, each including those before it. A server that listens to its own "
+                 "machine alone may be set to need none (auth.mode = \"local\")."}}}}},
+            {"parameters",
              {{"job_id",
                {{"name", "job_id"},
                 {"in", "path"},

@@ -8,7 +8,7 @@
 namespace colony::server::api {
 namespace {
 
-constexpr std::array<ProblemRow, 16> kTable = {{
+constexpr std::array<ProblemRow, 17> kTable = {{
     {ProblemKind::kMalformed, 400, "malformed", "The request cannot be read", 0},
     {ProblemKind::kInvalid, 422, "invalid", "Fields of the request are wrong", 0},
     {ProblemKind::kNotFound, 404, "not-found", "There is no such thing", 0},
@@ -25,6 +25,7 @@ constexpr std::array<ProblemRow, 16> kTable = {{
     {ProblemKind::kUnsupportedMediaType, 415, "unsupported-media-type", "The body is of another type than this takes", 0},
     {ProblemKind::kNotAcceptable, 406, "not-acceptable", "None of the accepted media types is offered", 0},
     {ProblemKind::kEngineChanged, 409, "engine-changed", "The job is of a version that gives other results", 0},
+    {ProblemKind::kPreconditionFailed, 412, "precondition-failed", "The resource is not as the request supposes", 0},
 }};
 
 }  // namespace

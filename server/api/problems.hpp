@@ -29,7 +29,8 @@ enum class ProblemKind {
   kInternal,
   kUnsupportedMediaType,
   kNotAcceptable,
-  kEngineChanged
+  kEngineChanged,
+  kPreconditionFailed
 };
 
 /// Of one document; a list of 100,000 wrong positions needs no 100,000 lines of answer. The detail says how many there

@@ -15,6 +15,12 @@ std::string number_text(double value) {
   return {text, std::to_chars(text, text + sizeof text, value, std::chars_format::fixed).ptr};
 }
 
+// The shortest text that reads back as the same number; any finite double fits.
+std::string shortest(double value) {
+  char text[32];
+  return {text, std::to_chars(text, text + sizeof text, value).ptr};
+}
+
 // Why a value is wrong; empty if it is right.
 std::string wrong_value(const QueryParam& param, const std::string& value) {
   const std::string range = "within " + number_text(param.min) + " to " + number_text(param.max);
@@ -124,6 +130,14 @@ Result<Query> Query::parse(const http::Request& request, std::span<const QueryPa
     values.push_back(value);
   }
   if (!errors.empty()) return Error{ErrorCode::kInvalid, "query parameters are wrong", std::move(errors)};
+  for (const auto& [name, values] : query.values_) {
+    const auto param = std::find_if(table.begin(), table.end(), [&](const QueryParam& one) { return one.name == name; });
+    for (const std::string& value : values) {
+      const bool is_number = param->type == QueryType::kInteger || param->type == QueryType::kNumber;
+      const std::string text = is_number ? shortest(*parse_number(value)) : value;
+      query.normalised_ += name + "=" + std::to_string(text.size()) + ":" + text + ";";
+    }
+  }
   return query;
 }
 

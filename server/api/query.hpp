@@ -31,6 +31,9 @@ class Query {
  public:
   static Result<Query> parse(const http::Request& request, std::span<const QueryParam> table);
 
+  /// The parameters in the order of their names, numbers in one spelling: queries that mean the same mostly read the same.
+  const std::string& normalised() const { return normalised_; }
+
   bool has(std::string_view name) const { return values_.find(name) != values_.end(); }
   std::optional<std::uint64_t> integer(std::string_view name) const;  // of a parameter with min >= 0
   std::optional<double> number(std::string_view name) const;
@@ -41,6 +44,7 @@ class Query {
 
  private:
   std::map<std::string, std::vector<std::string>, std::less<>> values_;  // checked against the table
+  std::string normalised_;
 };
 
 /// A decimal integer without sign or spaces; nullopt for anything else and beyond 64 bits.

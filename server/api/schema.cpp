@@ -69,6 +69,8 @@ Json preset_schema() { return {{"type", "string"}, {"enum", preset_names()}, {"d
 Json name_schema() {
   return {{"type", "string"}, {"maxLength", kNameCharactersMax}, {"pattern", "^[^\\u0000-\\u001f\\u007f-\\u009f]*$"}};
 }
+}  // namespace
+
 Json labels_schema() {
   return {
       {"type", "object"},
@@ -78,8 +80,6 @@ Json labels_schema() {
       {"additionalProperties",
        {{"type", "string"}, {"maxLength", kLabelValueBytesMax}, {"pattern", "^[^\\u0000-\\u001f\\u007f-\\u009f]*$"}}}};
 }
-
-}  // namespace
 
 std::string param_type_name(const ParamInfo& info) { return std::visit(TypeName{}, info.access); }
 

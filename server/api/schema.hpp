@@ -22,4 +22,7 @@ Json reference(std::string_view component);
 /// The type words of a parameter: "number", "integer or null", ...
 std::string param_type_name(const ParamInfo& info);
 
+/// Of `labels`, as submitted.
+Json labels_schema();
+
 }  // namespace colony::server::api

@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "engine/base/digest.hpp"
-#include "server/api/codec_event.hpp"
 
 namespace colony::server::api {
 
@@ -38,7 +37,7 @@ Status check_no_arguments(const std::string& body) {
 }
 
 http::Response submitted_response(const Context& context, const JobView& view, bool is_new) {
-  http::Response response = json_response(is_new ? 201 : 200, encode_job(view));
+  http::Response response = job_response(context, is_new ? 201 : 200, view);
   response.headers.set("Location", context.config.base_path + "/v1/jobs/" + view.job.id);
   return response;
 }

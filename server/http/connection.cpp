@@ -18,11 +18,22 @@ constexpr std::size_t kLingerBytesMax = 32 * 1024 * 1024;
 
 }  // namespace
 
-Connection::Connection(asio::ip::tcp::socket socket)
+Connection::Connection(asio::ip::tcp::socket socket, asio::ssl::context* tls)
     : socket_(std::move(socket)), deadline_(socket_.get_executor()), signal_(socket_.get_executor()) {
   error_code ignored;  // a socket that died already fails at its first read
   socket_.set_option(asio::ip::tcp::no_delay(true), ignored);
   socket_.non_blocking(true, ignored);
+  if (tls != nullptr) tls_ = std::make_unique<asio::ssl::stream<asio::ip::tcp::socket&>>(socket_, *tls);
+}
+
+Awaitable<Connection::Io> Connection::handshake(std::int64_t timeout_ms) {
+  if (!tls_) co_return Io::kDone;
+  arm(timeout_ms);
+  const auto [error] = co_await tls_->async_handshake(asio::ssl::stream_base::server, kAwait);
+  const bool is_late = deadline_has_passed_;
+  disarm();
+  if (!error) co_return Io::kDone;
+  co_return is_late ? Io::kTimeout : Io::kClosed;
 }
 
 void Connection::arm(std::int64_t timeout_ms) {
@@ -49,7 +60,13 @@ Awaitable<Connection::Io> Connection::read(std::size_t bytes_max) {
   const std::size_t size_before = input_.size();
   input_.resize(size_before + bytes_max);
   const asio::mutable_buffer space(input_.data() + size_before, bytes_max);
-  const auto [error, count] = co_await socket_.async_read_some(space, kAwait);
+  boost::system::error_code error;
+  std::size_t count = 0;
+  if (tls_) {
+    std::tie(error, count) = co_await tls_->async_read_some(space, kAwait);
+  } else {
+    std::tie(error, count) = co_await socket_.async_read_some(space, kAwait);
+  }
   input_.resize(size_before + count);
   if (!error) co_return Io::kDone;
   co_return deadline_has_passed_ ? Io::kTimeout : Io::kClosed;
@@ -81,15 +98,20 @@ Awaitable<Connection::Io> Connection::write(Pieces bytes, std::int64_t timeout_m
   disarm();
   if (!socket_.is_open()) co_return Io::kClosed;
   // Nearly always the socket takes all at once; then no timer is needed, and no turn of the loop.
+  // Not under TLS, whose records have to be made first.
   error_code error;
-  std::size_t count = socket_.write_some(buffers_of(bytes), error);  // does not block
+  std::size_t count = tls_ ? 0 : socket_.write_some(buffers_of(bytes), error);  // does not block
   if (error == asio::error::would_block || error == asio::error::try_again) error.clear();
   if (error) co_return Io::kClosed;
   while (advance(bytes, count)) {
     if (!socket_.is_open()) co_return Io::kClosed;
     arm(timeout_ms);
     const auto rest = buffers_of(bytes);
-    std::tie(error, count) = co_await socket_.async_write_some(rest, kAwait);
+    if (tls_) {
+      std::tie(error, count) = co_await tls_->async_write_some(rest, kAwait);
+    } else {
+      std::tie(error, count) = co_await socket_.async_write_some(rest, kAwait);
+    }
     if (error) co_return deadline_has_passed_ ? Io::kTimeout : Io::kClosed;
   }
   disarm();
@@ -126,7 +148,9 @@ void Connection::look_at_peer() {
   if (!socket_.is_open()) return;
   char bytes[kReadAheadStepBytes];
   error_code error;
-  const std::size_t count = socket_.read_some(asio::buffer(bytes), error);  // does not block
+  // Neither blocks. Under TLS what came may be half a record: then it would block, too.
+  const std::size_t count =
+      tls_ ? tls_->read_some(asio::buffer(bytes), error) : socket_.read_some(asio::buffer(bytes), error);
   if (!error) {
     input_.append(bytes, count);
   } else if (error != asio::error::would_block && error != asio::error::try_again) {
@@ -136,15 +160,29 @@ void Connection::look_at_peer() {
   watch_peer();
 }
 
+// Of the socket itself: what comes after our goodbye is thrown away unread.
+Awaitable<Connection::Io> Connection::read_raw(std::size_t bytes_max) {
+  if (deadline_has_passed_) co_return Io::kTimeout;
+  if (!socket_.is_open()) co_return Io::kClosed;
+  input_.resize(bytes_max);
+  const asio::mutable_buffer space(input_.data(), bytes_max);
+  const auto [error, count] = co_await socket_.async_read_some(space, kAwait);
+  input_.resize(count);
+  if (!error) co_return Io::kDone;
+  co_return deadline_has_passed_ ? Io::kTimeout : Io::kClosed;
+}
+
 Awaitable<void> Connection::linger() {
   error_code error;
+  // Says that the answer is whole (close_notify). The socket does not block, so the peer's own goodbye is not waited for.
+  if (tls_) tls_->shutdown(error);
+  error.clear();
   socket_.shutdown(asio::ip::tcp::socket::shutdown_send, error);
   if (!error) {
     arm(kLingerMs);
     std::size_t total = 0;
     while (total < kLingerBytesMax) {
-      input_.clear();
-      const Io io = co_await read(kLingerStepBytes);
+      const Io io = co_await read_raw(kLingerStepBytes);
       if (io != Io::kDone) break;
       total += input_.size();
     }

@@ -1,4 +1,4 @@
-// connection: one socket with deadlines: what a session needs of a socket, and nothing of HTTP.
+// connection: one socket with deadlines, plain or under TLS: what a session needs of a socket, and nothing of HTTP.
 // Promises that every read and write ends: with bytes, at its deadline, or closed. A deadline leaves the socket open,
 //          so that the reason can still be told (Beast's tcp_stream would close it: no 408 could be sent).
 // Threads: everything runs on the strand of executor(). At most one of read, write, wait and linger is under way.
@@ -15,6 +15,7 @@
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/ssl/stream.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/use_awaitable.hpp>
 
@@ -32,11 +33,16 @@ class Connection : public std::enable_shared_from_this<Connection> {
   enum class Io { kDone, kTimeout, kClosed };
   using Clock = std::chrono::steady_clock;
 
-  explicit Connection(boost::asio::ip::tcp::socket socket);
+  /// `tls`: what to speak, and outlives the connection; null: nothing, the bytes go as they are.
+  explicit Connection(boost::asio::ip::tcp::socket socket, boost::asio::ssl::context* tls = nullptr);
 
   boost::asio::any_io_executor executor() { return socket_.get_executor(); }
   /// What was read and not yet used; pipelined requests stand here.
   std::string& input() { return input_; }
+
+  bool is_encrypted() const { return tls_ != nullptr; }
+  /// Before anything else. Without TLS there is nothing to do.
+  Awaitable<Io> handshake(std::int64_t timeout_ms);
 
   /// One deadline for all reads until disarm or the next arm: a drip of single bytes does not prolong it.
   void arm(std::int64_t timeout_ms);
@@ -69,8 +75,11 @@ class Connection : public std::enable_shared_from_this<Connection> {
 
  private:
   void look_at_peer();
+  Awaitable<Io> read_raw(std::size_t bytes_max);
 
   boost::asio::ip::tcp::socket socket_;
+  // Over socket_, which deadlines cancel and which is closed: what TLS does above it then ends with an error.
+  std::unique_ptr<boost::asio::ssl::stream<boost::asio::ip::tcp::socket&>> tls_;
   boost::asio::steady_timer deadline_;
   boost::asio::steady_timer signal_;
   std::string input_;

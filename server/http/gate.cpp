@@ -155,7 +155,12 @@ Check read_addressee(std::string_view target, const GatePolicy& policy, RequestH
         "Host names a host that is not served here; allowed_hosts of the configuration lists those that are"};
   }
   for (const auto& [name, value] : head.headers.all()) {
-    if (equals_without_case(name, "Origin") && !is_own_origin(value, *host, policy)) {
+    if (!equals_without_case(name, "Origin") || is_own_origin(value, *host, policy)) continue;
+    const bool is_listed =
+        std::find(policy.cors_origins.begin(), policy.cors_origins.end(), value) != policy.cors_origins.end();
+    if (is_listed && head.headers.count("Origin") == 1) {
+      head.cors_origin = value;
+    } else {
       return Refusal{403, "foreign-origin", "The request comes from another site's page",
                      "Origin is not an address of this server, so the request is not carried out"};
     }

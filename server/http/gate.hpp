@@ -29,6 +29,7 @@ struct GatePolicy {
   std::size_t body_bytes_max = 0;
   std::string large_body_path = {};      // with the base path; a POST there may have a larger body. Empty: none
   std::size_t large_body_bytes_max = 0;
+  std::vector<std::string> cors_origins = {};  // other sites whose pages may ask, as an Origin says them, lower case
 };
 
 struct Refusal {
@@ -36,6 +37,8 @@ struct Refusal {
   std::string code;  // of the problem type
   std::string title;
   std::string detail;
+  std::string challenge = {};        // WWW-Authenticate; empty: none
+  std::int64_t retry_after_s = 0;    // 0: no Retry-After
 };
 
 /// Finds the end of a header in bytes that arrive in pieces, each byte looked at once.
@@ -68,6 +71,7 @@ struct RequestHead {
   bool keep_alive = true;
   bool expects_continue = false;
   std::string request_id;  // the client's if it is acceptable, else empty
+  std::string cors_origin;  // the Origin, if it is one of cors_origins; else empty
 };
 
 /// `bytes` is a header as HeadScanner found it. What could be read before a refusal stands in `head`, for

@@ -72,11 +72,26 @@ class BodySource {
   virtual std::string_view farewell() const { return {}; }
 };
 
+struct Response;
+
+/// An answer that waits for something without holding a thread. The session calls `on_ready` once, then `ask` at once, whenever woken,
+/// and a last time when `wait_max` is over or the server drains; all of it, and the destructor, on worker threads.
+class LaterAnswer {
+ public:
+  virtual ~LaterAnswer() = default;
+  /// `wake` may be called from any thread, also spuriously, but not after this object is destroyed.
+  virtual void on_ready(std::function<void()> wake) = 0;
+  /// nullptr: not yet. With `is_last` there must be an answer, itself without `later`.
+  virtual std::unique_ptr<Response> ask(bool is_last) = 0;
+  virtual std::chrono::milliseconds wait_max() const = 0;
+};
+
 struct Response {
   int status = 200;
   Headers headers;                                             // Content-Type and the like; the session adds the rest
   std::string body;
   std::unique_ptr<BodySource> stream;                          // if set: sent chunked instead of body
+  std::unique_ptr<LaterAnswer> later;                          // if set: nothing else counts, the answer comes from it
 };
 
 }  // namespace colony::server::http

@@ -86,11 +86,18 @@ Response problem(int status, std::string_view code, std::string_view title, std:
   return response;
 }
 
-void Router::add(std::string method, std::string pattern, Handler handler, Weight weight) {
+void Router::add(std::string method, std::string pattern, Handler handler, Weight weight, Access access) {
   CHECK(!pattern.empty() && pattern.front() == '/');
   auto segments = split(pattern);
   for (const auto& route : routes_) CHECK(route.method != method || route.segments != segments);
-  routes_.push_back({std::move(method), std::move(segments), std::move(handler), weight});
+  routes_.push_back({std::move(method), std::move(segments), std::move(handler), weight, access});
+}
+
+Access Router::access_of(std::string_view method, const std::string& path) const {
+  if (method == "OPTIONS") return Access::kOpen;
+  const auto* const pattern = pattern_of(split(path));
+  const Route* const route = pattern ? route_of(*pattern, method) : nullptr;
+  return route ? route->access : Access::kRead;
 }
 
 void Router::set_ready(std::string_view method, const std::string& pattern, ReadyHandler handler) {
@@ -115,6 +122,10 @@ std::optional<Response> Router::dispatch_ready(Request& request) const {
   } catch (const std::exception&) {
     return std::nullopt;  // memory, say: a worker tries again and reports
   }
+}
+
+void Router::advertise(std::string_view pattern, std::string name, std::string value) {
+  adverts_.push_back({split(pattern), std::move(name), std::move(value)});
 }
 
 void Router::report_failure(const Request& request, std::string_view what) const {
@@ -166,6 +177,9 @@ Response Router::dispatch(Request& request) const {
     Response response;
     if (request.method == "OPTIONS") {
       response.status = 204;
+      for (const auto& advert : adverts_) {
+        if (advert.segments == *pattern) response.headers.set(advert.name, advert.value);
+      }
     } else {
       response = problem(405, "method-not-allowed", "The method is not allowed here",
                          request.path + " does not take " + request.method + ", but " + allow, request.request_id);

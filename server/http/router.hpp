@@ -13,6 +13,9 @@
 
 namespace colony::server::http {
 
+/// What a request needs where tokens are required. Open: nothing.
+enum class Access { kOpen, kRead, kSubmit, kAdmin };
+
 using Handler = std::function<Response(const Request&)>;
 
 /// application/problem+json (RFC 9457); http/ needs it for its own refusals and has no JSON library, so it escapes by itself.
@@ -24,7 +27,13 @@ class Router {
   /// `pattern`: segments, "{}" captures one, e.g. "/v1/jobs/{}/events". HEAD is answered by the GET handler without its body.
   /// Heavy handlers (seconds of computing) run on at most half of the worker threads.
   enum class Weight { kLight, kHeavy };
-  void add(std::string method, std::string pattern, Handler handler, Weight weight = Weight::kLight);
+  void add(std::string method, std::string pattern, Handler handler, Weight weight = Weight::kLight,
+           Access access = Access::kRead);
+  /// HEAD needs what GET does, OPTIONS nothing (a browser sends it without the token); what is nowhere needs a token all the
+  /// same: 404 is told to those who are let in.
+  Access access_of(std::string_view method, const std::string& path) const;
+  /// A header of the answers to OPTIONS for this pattern, e.g. Accept-Patch.
+  void advertise(std::string_view pattern, std::string name, std::string value);
   bool is_heavy(const Request& request) const;
   /// Of a route that is there: what can be answered from memory, on an I/O thread, without waiting for anything; nullopt: dispatch.
   using ReadyHandler = std::function<std::optional<Response>(const Request&)>;
@@ -39,11 +48,13 @@ class Router {
   void report_failure(const Request& request, std::string_view what) const;
 
  private:
-  struct Route { std::string method; std::vector<std::string> segments; Handler handler; Weight weight; };
+  struct Route { std::string method; std::vector<std::string> segments; Handler handler; Weight weight; Access access; };
   const std::vector<std::string>* pattern_of(const std::vector<std::string>& path) const;   // nullptr: none fits
   const Route* route_of(const std::vector<std::string>& pattern, std::string_view method) const;   // GET answers HEAD
+  struct Advert { std::vector<std::string> segments; std::string name, value; };
   std::vector<Route> routes_;
   std::vector<std::pair<std::size_t, ReadyHandler>> ready_;   // index of the route
+  std::vector<Advert> adverts_;
   std::function<void(const Request&, std::string_view)> failure_log_;
 };
 

@@ -14,8 +14,10 @@
 #include <boost/asio/post.hpp>
 #include <boost/asio/strand.hpp>
 
+#include "engine/base/check.hpp"
 #include "server/http/session.hpp"
 #include "server/http/text.hpp"
+#include "server/http/tls.hpp"
 
 namespace colony::server::http {
 namespace asio = boost::asio;
@@ -44,6 +46,8 @@ Status check_config(const ServerConfig& config) {
       {"header_bytes_max", config.header_bytes_max},
       {"header_fields_max", config.header_fields_max},
       {"target_bytes_max", config.target_bytes_max},
+      {"connections_per_address_max", config.connections_per_address_max},
+      {"handshake_timeout_ms", config.handshake_timeout_ms > 0},
       {"header_timeout_ms", config.header_timeout_ms > 0},
       {"body_timeout_ms", config.body_timeout_ms > 0},
       {"idle_timeout_ms", config.idle_timeout_ms > 0},
@@ -63,6 +67,16 @@ Status check_config(const ServerConfig& config) {
     return config_error("server.base_path", "must begin with '/' and not end with one");
   }
   return Ok{};
+}
+
+AdmissionConfig admission_config(const ServerConfig& config) {
+  AdmissionConfig out;
+  out.tokens_required = config.tokens_required;
+  out.trusts_forwarded_for = config.trusts_forwarded_for;
+  out.limits_loopback = config.limits_loopback;
+  out.requests = {config.requests_per_s, config.requests_burst};
+  out.failed_tokens_per_min = config.failed_tokens_per_min;
+  return out;
 }
 
 std::string to_text(const tcp::endpoint& endpoint) {
@@ -109,11 +123,13 @@ class RefusedConnection : public std::enable_shared_from_this<RefusedConnection>
 
 class BeastServer final : public Server {
  public:
-  BeastServer(ServerConfig config, const Router& router, std::function<void(const AccessRecord&)> log)
+  BeastServer(ServerConfig config, const Router& router, const TokenTable& tokens,
+              std::function<void(const AccessRecord&)> log)
       : config_(std::move(config)),
+        admission_(admission_config(config_), tokens),
         workers_(config_.worker_threads, config_.requests_waiting_max),
-        shared_{
-            config_, policy_, router, workers_, request_ids_, std::move(log), [this](std::uint64_t id) { on_end(id); }},
+        shared_{config_,    policy_,  router,       admission_,
+                workers_,   request_ids_, std::move(log), [this](std::uint64_t id) { on_end(id); }},
         acceptor_(asio::make_strand(io_)),
         pause_(acceptor_.get_executor()),
         work_(asio::make_work_guard(io_)) {}
@@ -124,10 +140,16 @@ class BeastServer final : public Server {
     error_code error;
     const auto address = asio::ip::make_address(config_.address, error);
     if (error) return listen_error("'" + config_.address + "' is not an IP address");
-    if (!address.is_loopback()) {
+    const bool has_tls = !config_.tls_certificate.empty();
+    if (!address.is_loopback() && !(config_.tokens_required && (has_tls || config_.behind_proxy))) {
       return listen_error("'" + config_.address +
-                          "' is not a loopback address (127.0.0.0/8 or ::1); this version has no tokens and "
-                          "no TLS, so it serves this machine only");
+                          "' is not a loopback address: it needs tokens, and TLS or a proxy that does it");
+    }
+    if (has_tls) {
+      auto made = make_tls_context(config_.tls_certificate, config_.tls_key);
+      if (!made) return made.error();
+      tls_ = std::move(*made);
+      shared_.tls = tls_.get();
     }
     const tcp::endpoint endpoint(address, config_.port);
     acceptor_.open(endpoint.protocol(), error);
@@ -142,6 +164,7 @@ class BeastServer final : public Server {
       std::transform(host.begin(), host.end(), lower.begin(), to_lower);
       policy_.allowed_hosts.push_back(std::move(lower));
     }
+    policy_.cors_origins = config_.cors_origins;
     policy_.header_bytes_max = config_.header_bytes_max;
     policy_.header_fields_max = config_.header_fields_max;
     policy_.target_bytes_max = config_.target_bytes_max;
@@ -171,9 +194,9 @@ class BeastServer final : public Server {
     {
       std::unique_lock lock(mutex_);
       draining_ = true;
-      for (const auto& [id, session] : sessions_) session->drain();
+      for (const auto& [id, entry] : sessions_) entry.session->drain();
       ended_.wait_for(lock, std::chrono::milliseconds(grace_ms), [this] { return sessions_.empty(); });
-      for (const auto& [id, session] : sessions_) session->close();
+      for (const auto& [id, entry] : sessions_) entry.session->close();
       // What still keeps a session now is a handler or a pull that runs.
       ended_.wait(lock, [this] { return sessions_.empty(); });
     }
@@ -205,27 +228,36 @@ class BeastServer final : public Server {
     error_code error;
     const auto remote = socket.remote_endpoint(error);
     if (error) return;  // gone already
+    const auto client = client_address(remote.address().to_string());
+    CHECK(client.has_value());
+    const bool is_counted = !client->is_loopback || config_.limits_loopback;
     std::shared_ptr<Session> session;
+    bool is_too_many_of_one = false;
     {
       const std::lock_guard lock(mutex_);
       if (draining_) return;
-      if (sessions_.size() < config_.connections_max) {
+      is_too_many_of_one = is_counted && of_address_[client->key] >= config_.connections_per_address_max;
+      if (sessions_.size() < config_.connections_max && !is_too_many_of_one) {
         const std::uint64_t id = ++session_count_;
-        session = std::make_shared<Session>(std::move(socket), shared_, id, to_text(remote));
-        sessions_.emplace(id, session);
+        session = std::make_shared<Session>(std::move(socket), shared_, id, to_text(remote), *client);
+        sessions_.emplace(id, Entry{session, is_counted ? client->key : std::string()});
+        if (is_counted) ++of_address_[client->key];
+      } else if (is_counted && of_address_[client->key] == 0) {
+        of_address_.erase(client->key);
       }
     }
     if (session) {
       session->start();
     } else {
-      refuse(std::move(socket));
+      refuse(std::move(socket), is_too_many_of_one ? "too many connections come from your address; close some"
+                                                   : "too many connections are open; try again in a second");
     }
   }
 
-  void refuse(tcp::socket socket) {
+  void refuse(tcp::socket socket, std::string_view why) {
+    if (tls_) return;  // what is said before a handshake would be noise; a close is understood
     const std::string id = request_ids_.next();
-    Response response =
-        problem(503, "too-many-connections", "The server has too many connections", "try again in a second", id);
+    Response response = problem(503, "too-many-connections", "The server has too many connections", why, id);
     response.headers.set("Retry-After", "1");
     WireOptions options;
     options.keep_alive = false;
@@ -243,14 +275,25 @@ class BeastServer final : public Server {
 
   void on_end(std::uint64_t id) {
     const std::lock_guard lock(mutex_);
-    sessions_.erase(id);
+    const auto ended = sessions_.find(id);
+    if (const auto of = of_address_.find(ended->second.address_key); of != of_address_.end() && --of->second == 0) {
+      of_address_.erase(of);
+    }
+    sessions_.erase(ended);
     ended_.notify_all();
   }
+
+  struct Entry {
+    std::shared_ptr<Session> session;
+    std::string address_key;  // empty: not counted
+  };
 
   const ServerConfig config_;  // fixed after construction, as is all down to shared_ (policy_: after listen)
   GatePolicy policy_;
   std::atomic<int> refused_count_{0};
-  RequestIds request_ids_;  // synchronises itself, as the two below
+  std::unique_ptr<asio::ssl::context> tls_;  // null: plain
+  Admission admission_;     // synchronises itself, as all down to workers_
+  RequestIds request_ids_;
   asio::io_context io_;
   WorkerPool workers_;
   SessionShared shared_;
@@ -266,15 +309,16 @@ class BeastServer final : public Server {
   std::condition_variable ended_;
   bool draining_ = false;
   std::uint64_t session_count_ = 0;
-  std::map<std::uint64_t, std::shared_ptr<Session>> sessions_;  // at most config_.connections_max
+  std::map<std::uint64_t, Entry> sessions_;  // at most config_.connections_max
+  std::map<std::string, std::size_t> of_address_;  // open connections that are counted
 };
 
 }  // namespace
 
-Result<std::unique_ptr<Server>> Server::create(ServerConfig config, const Router& router,
+Result<std::unique_ptr<Server>> Server::create(ServerConfig config, const Router& router, const TokenTable& tokens,
                                                std::function<void(const AccessRecord&)> log) {
   if (const auto status = check_config(config); !status) return status.error();
-  auto server = std::make_unique<BeastServer>(std::move(config), router, std::move(log));
+  auto server = std::make_unique<BeastServer>(std::move(config), router, tokens, std::move(log));
   const auto status = server->listen();
   if (!status) return status.error();
   return std::unique_ptr<Server>(std::move(server));

@@ -1,6 +1,7 @@
 // server: the listener, its sessions and the request gate (Boost.Beast inside; nothing of it is visible here).
 // The gate refuses before any handler runs: bad framing (400), foreign Host or Origin (421/403), header (431), target (414),
-// body (413) over the limit, header and body deadlines (408), too many connections (503 with Retry-After).
+// body (413) over the limit, header and body deadlines (408), too many connections (503 with Retry-After). Then admission:
+// tokens (401), scopes (403), rates (429).
 #pragma once
 
 #include <cstdint>
@@ -11,6 +12,7 @@
 
 #include "engine/base/result.hpp"
 #include "server/http/router.hpp"
+#include "server/http/tokens.hpp"
 
 namespace colony::server::http {
 
@@ -22,6 +24,8 @@ struct ServerConfig {
   std::size_t io_threads = 1;
   std::size_t worker_threads = 4;
   std::size_t connections_max = 2000;
+  std::size_t connections_per_address_max = 200;   // not of loopback, unless
+  bool limits_loopback = false;                // this says so; also for rates without a token
   std::size_t requests_waiting_max = 256;      // for a worker; beyond: 503 with Retry-After
   std::size_t header_bytes_max = 8 * 1024;
   std::size_t header_fields_max = 100;
@@ -30,6 +34,15 @@ struct ServerConfig {
   std::string large_body_path;                 // without the base path: a POST there may have
   std::size_t large_body_bytes_max = 32 * 1024 * 1024;   // so many bytes; the empty path: no such place
   std::size_t large_bodies_max = 8;            // held at a time, from the first byte to the answer; beyond: 503
+  std::vector<std::string> cors_origins;       // "https://lab.example": sites whose pages may ask
+  bool tokens_required = false;
+  std::string tls_certificate, tls_key;        // paths of PEM files; both or neither
+  bool behind_proxy = false;                   // a proxy does TLS: an address that is not loopback may be bound without
+  bool trusts_forwarded_for = false;           // the last entry of X-Forwarded-For is the client's address
+  double requests_per_s = 200.0;               // of a token, or of an address without one; 0: no limit
+  double requests_burst = 1000.0;
+  double failed_tokens_per_min = 30.0;         // of an address; 0: no limit
+  std::int64_t handshake_timeout_ms = 10'000;
   std::int64_t header_timeout_ms = 10'000;
   std::int64_t body_timeout_ms = 30'000;
   std::int64_t idle_timeout_ms = 60'000;
@@ -43,12 +56,14 @@ struct AccessRecord {
   int status = 0;
   std::int64_t duration_us = 0;
   std::uint64_t body_bytes = 0;
+  std::string actor, token_id;                 // empty: refused before it was known
 };
 
 class Server {
  public:
-  /// Binds and listens. Errors: kInvalid "server.listen" for an address that is not loopback or cannot be bound.
-  static Result<std::unique_ptr<Server>> create(ServerConfig config, const Router& router,
+  /// Binds and listens; `router` and `tokens` outlive it. Errors: kInvalid "server.listen" for an address that cannot be bound, or
+  /// that is not loopback without tokens and either TLS or a proxy that does it; "tls.certificate", "tls.key".
+  static Result<std::unique_ptr<Server>> create(ServerConfig config, const Router& router, const TokenTable& tokens,
                                                 std::function<void(const AccessRecord&)> log);
   virtual ~Server() = default;
   virtual std::uint16_t port() const = 0;

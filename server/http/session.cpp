@@ -8,6 +8,7 @@
 #include <boost/asio/post.hpp>
 
 #include "server/http/body_reader.hpp"
+#include "server/http/guarded_source.hpp"
 
 namespace colony::server::http {
 namespace asio = boost::asio;
@@ -18,6 +19,9 @@ using Io = Connection::Io;
 constexpr std::size_t kHeadReadBytes = 4 * 1024;
 constexpr std::size_t kBodyReadBytes = 64 * 1024;
 constexpr std::size_t kIdleInputBytesMax = 16 * 1024;   // an idle connection keeps no larger buffer
+// What pages of listed sites may send beyond what any page may.
+constexpr std::string_view kCorsRequestHeaders =
+    "Authorization, Content-Type, Idempotency-Key, If-Match, If-None-Match, Last-Event-ID, Prefer, X-Request-Id";
 constexpr std::size_t kJoinedBodyBytesMax = 32 * 1024;  // up to here head and body are sent in one write
 
 std::uint64_t random_64() {
@@ -53,11 +57,13 @@ std::string RequestIds::next() {
   return id;
 }
 
-Session::Session(asio::ip::tcp::socket socket, SessionShared& shared, std::uint64_t id, std::string remote)
-    : connection_(std::make_shared<Connection>(std::move(socket))),
+Session::Session(asio::ip::tcp::socket socket, SessionShared& shared, std::uint64_t id, std::string remote,
+                 ClientAddress peer)
+    : connection_(std::make_shared<Connection>(std::move(socket), shared.tls)),
       shared_(shared),
       id_(id),
-      remote_(std::move(remote)) {}
+      remote_(std::move(remote)),
+      peer_(std::move(peer)) {}
 
 void Session::start() { asio::co_spawn(connection_->executor(), run(shared_from_this()), asio::detached); }
 
@@ -79,7 +85,8 @@ void Session::close() {
 
 Awaitable<void> Session::run(std::shared_ptr<Session> self) {
   try {
-    bool goes_on = true;
+    const Io io = co_await self->connection_->handshake(self->shared_.config.handshake_timeout_ms);
+    bool goes_on = io == Io::kDone;
     while (goes_on) goes_on = co_await self->serve_one();
   } catch (const std::exception& error) {
     // Only a lack of memory can come here; the connection ends, the server goes on.
@@ -97,18 +104,32 @@ Awaitable<bool> Session::serve_one() {
   request_ = Request();
   response_ = Response();
   refusal_.reset();
+  is_inside_ = false;
+  is_admitted_ = false;
+  forwarded_.clear();
   sent_bytes_ = 0;
   bool goes_on = co_await read_head();
   if (!goes_on) co_return false;
   served_before_ = true;
-  if (!refusal_) refusal_ = admit();
+  if (!refusal_) {
+    is_inside_ = fill_request();
+    refusal_ = admit();
+  }
   if (!refusal_) {
     goes_on = co_await read_body();
     if (!goes_on) co_return false;
   }
   if (head_.request_id.empty()) head_.request_id = shared_.request_ids.next();
-  const bool is_routed = !refusal_ && fill_request();
-  if (is_routed) co_await handle();
+  request_.request_id = head_.request_id;
+  if (!refusal_) {
+    if (is_inside_) {
+      co_await handle();
+      settle_answer();
+    } else {
+      response_ = problem(404, "not-found", "There is nothing here", "no resource has the path " + request_.path,
+                          request_.request_id);
+    }
+  }
   co_return co_await answer();
 }
 
@@ -154,11 +175,21 @@ Awaitable<bool> Session::read_head() {
   co_return true;
 }
 
-// Here tokens will be checked: after the gate, so that only well-formed requests are looked at, and before the body is
-// read, so that a stranger cannot make the server hold one. In this version only loopback addresses are bound and every
-// local user is admitted.
-// Bodies beyond the common limit are counted, too: thirty megabytes a connection would be more than the machine has.
 std::optional<Refusal> Session::admit() {
+  const bool is_forwarded = shared_.admission.config().trusts_forwarded_for;
+  const ClientAddress client = is_forwarded ? forwarded_address(head_.headers, peer_) : peer_;
+  if (is_forwarded) forwarded_ = client.text;
+  // What lies outside the base path is nowhere.
+  const Access access = is_inside_ ? shared_.router.access_of(request_.method, request_.path) : Access::kRead;
+  auto refusal =
+      shared_.admission.admit(head_.headers, access, client, Admission::Moment::now(), request_.principal);
+  if (refusal) return refusal;
+  is_admitted_ = true;
+  return take_large_body();
+}
+
+// Bodies beyond the common limit are counted: thirty megabytes a connection would be more than the machine has.
+std::optional<Refusal> Session::take_large_body() {
   if (!head_.may_be_large) return std::nullopt;
   if (shared_.large_bodies.fetch_add(1) >= shared_.config.large_bodies_max) {
     shared_.large_bodies.fetch_sub(1);
@@ -196,22 +227,17 @@ Awaitable<bool> Session::read_body() {
   co_return true;
 }
 
-// False: outside base_path; the response is there already.
+// False: outside base_path.
 bool Session::fill_request() {
   request_.method = head_.method;
   request_.path = head_.target.path;
   request_.query = head_.target.query;
   request_.headers = head_.headers;
-  request_.request_id = head_.request_id;
   const std::string& base = shared_.config.base_path;
   if (base.empty()) return true;
   const bool is_inside = request_.path.compare(0, base.size(), base) == 0 &&
                          (request_.path.size() == base.size() || request_.path[base.size()] == '/');
-  if (!is_inside) {
-    response_ = problem(404, "not-found", "There is nothing here", "no resource has the path " + request_.path,
-                        request_.request_id);
-    return false;
-  }
+  if (!is_inside) return false;
   request_.path.erase(0, base.size());
   if (request_.path.empty()) request_.path = "/";
   return true;
@@ -242,16 +268,43 @@ Awaitable<void> Session::handle() {
   const bool is_queued = shared_.workers.submit_request(std::move(task), shared_.router.is_heavy(request_));
   if (is_queued) {
     co_await wait_for_worker();
+    if (response_.later) co_await wait_for_later();
   } else {
     refusal_ =
         Refusal{503, "overloaded", "The server is busy", "too many requests wait already; try again in a second"};
   }
 }
 
+// A token may have ended while the answer was made. What was done was done by right; what was found is not told any more.
+void Session::settle_answer() {
+  const TokenTable& tokens = shared_.admission.tokens();
+  const Principal& who = request_.principal;
+  const bool is_question = head_.method == "GET" || head_.method == "HEAD";
+  if (is_question && !who.token_id.empty() && !tokens.is_alive(who.token_id, unix_time_ms())) {
+    let_go_of_stream();
+    refusal_ = token_has_ended();
+    return;
+  }
+  if (response_.stream) response_.stream = guarded(std::move(response_.stream), tokens, who);
+  answer_preflight();
+}
+
+// A browser asks so before it lets a page of a listed site ask. The router's answer to OPTIONS says the methods.
+void Session::answer_preflight() {
+  const bool is_preflight = head_.method == "OPTIONS" && !head_.cors_origin.empty() &&
+                            head_.headers.count("Access-Control-Request-Method") != 0;
+  if (!is_preflight || response_.status != 204) return;
+  response_.headers.set("Access-Control-Allow-Methods", response_.headers.get("Allow").value_or(""));
+  response_.headers.set("Access-Control-Allow-Headers", kCorsRequestHeaders);
+  response_.headers.set("Access-Control-Max-Age", "600");
+}
+
 void Session::prepare_response() {
   if (refusal_) {
     response_ = problem(refusal_->status, refusal_->code, refusal_->title, refusal_->detail, head_.request_id);
     if (refusal_->status == 503) response_.headers.set("Retry-After", "1");
+    if (refusal_->retry_after_s > 0) response_.headers.set("Retry-After", std::to_string(refusal_->retry_after_s));
+    if (!refusal_->challenge.empty()) response_.headers.set("WWW-Authenticate", refusal_->challenge);
   } else if (const auto fault = fault_of(response_)) {
     let_go_of_stream();
     shared_.router.report_failure(request_, *fault);
@@ -267,6 +320,9 @@ Awaitable<bool> Session::answer() {
   WireOptions options;
   options.version_minor = head_.version_minor;
   options.request_id = head_.request_id;
+  options.is_encrypted = connection_->is_encrypted();
+  options.cors_origin = head_.cors_origin;
+  options.varies_by_origin = !shared_.config.cors_origins.empty();
   if (response_.stream) options.framing = head_.version_minor == 0 ? Framing::kUntilClose : Framing::kChunked;
   if (options.framing == Framing::kUntilClose) keep_alive_ = false;
   options.keep_alive = keep_alive_;
@@ -303,9 +359,11 @@ void Session::write_log() const {
   record.method = head_.method;
   record.path = head_.target.path;
   record.request_id = head_.request_id;
-  record.remote = remote_;
+  record.remote = forwarded_.empty() ? remote_ : forwarded_;
   record.status = response_.status;
   record.body_bytes = sent_bytes_;
+  record.actor = is_admitted_ || !request_.principal.token_id.empty() ? request_.principal.name : std::string();
+  record.token_id = request_.principal.token_id;
   const auto duration = Connection::Clock::now() - begin_;
   record.duration_us = std::chrono::duration_cast<std::chrono::microseconds>(duration).count();
   shared_.log(record);

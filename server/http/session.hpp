@@ -17,6 +17,7 @@
 #include <string>
 #include <string_view>
 
+#include "server/http/admission.hpp"
 #include "server/http/connection.hpp"
 #include "server/http/gate.hpp"
 #include "server/http/router.hpp"
@@ -43,16 +44,19 @@ struct SessionShared {
   const ServerConfig& config;
   const GatePolicy& policy;
   const Router& router;
+  Admission& admission;
   WorkerPool& workers;
   RequestIds& request_ids;
   std::function<void(const AccessRecord&)> log;  // may be empty
   std::function<void(std::uint64_t session_id)> on_end;
+  boost::asio::ssl::context* tls = nullptr;  // null: plain
   std::atomic<std::size_t> large_bodies{0};  // held now; at most config.large_bodies_max
 };
 
 class Session : public std::enable_shared_from_this<Session> {
  public:
-  Session(boost::asio::ip::tcp::socket socket, SessionShared& shared, std::uint64_t id, std::string remote);
+  Session(boost::asio::ip::tcp::socket socket, SessionShared& shared, std::uint64_t id, std::string remote,
+          ClientAddress peer);
 
   void start();
   /// Ends at once if no request is under way; else after its answer, a stream after its farewell.
@@ -74,10 +78,15 @@ class Session : public std::enable_shared_from_this<Session> {
   Awaitable<bool> send_piece(Framing framing, std::string_view shared, std::string_view own);
   Awaitable<void> wait_for_stream(std::string_view farewell, Connection::Clock::time_point until);
   Awaitable<void> wait_for_worker();
+  Awaitable<void> wait_for_later();  // session_later.cpp
+  void ask_later(bool is_first, bool is_last);
 
   std::optional<Refusal> admit();
+  std::optional<Refusal> take_large_body();
   void give_back_large_body();
   bool fill_request();
+  void settle_answer();
+  void answer_preflight();
   WorkerPool::Task as_worker_task(std::function<void()> work);
   void prepare_response();
   void pull_stream(bool is_first);
@@ -90,6 +99,7 @@ class Session : public std::enable_shared_from_this<Session> {
   SessionShared& shared_;
   const std::uint64_t id_;
   const std::string remote_;
+  const ClientAddress peer_;
   std::atomic<bool> closing_{false};  // read by workers, to skip what nobody waits for
   bool draining_ = false;
   Phase phase_ = Phase::kReadingHead;
@@ -99,6 +109,9 @@ class Session : public std::enable_shared_from_this<Session> {
   Connection::Clock::time_point begin_;
   RequestHead head_;
   std::optional<Refusal> refusal_;
+  bool is_inside_ = false;    // under base_path
+  bool is_admitted_ = false;  // request_.principal is who asks
+  std::string forwarded_;   // the client's address, if a trusted proxy says it
   Request request_;
   Response response_;
   bool keep_alive_ = false;
@@ -108,6 +121,7 @@ class Session : public std::enable_shared_from_this<Session> {
   bool worker_is_done_ = false;
   std::shared_ptr<Waker> waker_;
   bool woken_ = false;
+  std::unique_ptr<Response> late_;  // what a later answer gave
   std::string piece_;
   std::shared_ptr<const std::string> shared_piece_;  // goes before it
   std::optional<BodySource::Pull> pulled_;  // empty: the pull threw

@@ -19,8 +19,37 @@ std::string two_digits(int value) {
   return digits.size() < 2 ? "0" + digits : digits;
 }
 
+// For a page of ours: its own scripts, styles and data, nothing from elsewhere, nothing inline. For everything else, which is no page:
+// nothing at all, should a browser take it for one.
+constexpr std::string_view kPagePolicy =
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; font-src 'self'; "
+    "connect-src 'self'; worker-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+constexpr std::string_view kDataPolicy = "default-src 'none'; frame-ancestors 'none'";
+constexpr std::string_view kExposedHeaders = "ETag, Link, Location, Retry-After, X-Request-Id";
+
 void add_line(std::string& out, std::string_view name, std::string_view value) {
   out.append(name).append(": ").append(value).append("\r\n");
+}
+
+// What a handler has set stands: it may know better.
+void add_policies(std::string& out, const Response& response, const WireOptions& options) {
+  const auto add = [&](std::string_view name, std::string_view value) {
+    if (response.headers.count(name) == 0) add_line(out, name, value);
+  };
+  const std::string_view type = response.headers.get("Content-Type").value_or("");
+  const bool is_page = type.substr(0, 9) == "text/html";
+  add("Cache-Control", "no-store");
+  add("X-Content-Type-Options", "nosniff");
+  add("Content-Security-Policy", is_page ? kPagePolicy : kDataPolicy);
+  add("Referrer-Policy", "no-referrer");
+  add("Cross-Origin-Resource-Policy", "same-origin");
+  if (is_page) add("Cross-Origin-Opener-Policy", "same-origin");
+  if (options.is_encrypted) add("Strict-Transport-Security", "max-age=31536000");
+  if (options.varies_by_origin) add_line(out, "Vary", "Origin");
+  if (!options.cors_origin.empty()) {
+    add_line(out, "Access-Control-Allow-Origin", options.cors_origin);
+    add_line(out, "Access-Control-Expose-Headers", kExposedHeaders);
+  }
 }
 
 }  // namespace
@@ -48,8 +77,7 @@ std::string write_head(const Response& response, const WireOptions& options) {
   std::string out = "HTTP/1.1 " + std::to_string(response.status) + " ";
   out.append(reason_phrase(response.status)).append("\r\n");
   for (const auto& [name, value] : response.headers.all()) add_line(out, name, value);
-  if (response.headers.count("Cache-Control") == 0) add_line(out, "Cache-Control", "no-store");
-  if (response.headers.count("X-Content-Type-Options") == 0) add_line(out, "X-Content-Type-Options", "nosniff");
+  add_policies(out, response, options);
   add_line(out, "X-Request-Id", options.request_id);
   const auto now = std::chrono::system_clock::now().time_since_epoch();
   add_line(out, "Date", write_date(std::chrono::duration_cast<std::chrono::seconds>(now).count()));

@@ -21,6 +21,9 @@ struct WireOptions {
   bool keep_alive = true;
   int version_minor = 1;  // of the request: a kept HTTP/1.0 connection must be told so
   std::string_view request_id;
+  bool is_encrypted = false;          // then browsers are told to stay with https
+  std::string_view cors_origin = {};  // of a foreign page that may read this answer; empty: none
+  bool varies_by_origin = false;      // there are such pages at all
 };
 
 /// What a handler did that no response may carry, e.g. a line break in a header; nullopt if all is well.

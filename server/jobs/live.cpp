@@ -24,34 +24,37 @@ std::optional<double> fraction_of(double time_h, std::uint64_t cells, const std:
 
 class Hub::Entry : public JobService::Subscription {
  public:
-  Entry(std::shared_ptr<Hub> hub, std::int64_t job_key, std::function<void()> wake)
-      : hub_(std::move(hub)), job_key_(job_key), wake_(std::move(wake)) {
+  Entry(std::shared_ptr<Hub> hub, std::optional<std::int64_t> job_key, std::function<void(const JobNews&)> hear)
+      : hub_(std::move(hub)), job_key_(job_key), hear_(std::move(hear)) {
     const std::lock_guard lock(hub_->mutex_);
-    hub_->watchers_[job_key_].insert(this);
+    hub_->followers_[job_key_].insert(this);
   }
   ~Entry() override {
     const std::lock_guard lock(hub_->mutex_);
-    const auto found = hub_->watchers_.find(job_key_);
+    const auto found = hub_->followers_.find(job_key_);
     found->second.erase(this);
-    if (found->second.empty()) hub_->watchers_.erase(found);
+    if (found->second.empty()) hub_->followers_.erase(found);
   }
-  void wake() const { wake_(); }
+  void hear(const JobNews& news) const { hear_(news); }
 
  private:
   const std::shared_ptr<Hub> hub_;  // a subscription may outlive the service
-  const std::int64_t job_key_;
-  const std::function<void()> wake_;
+  const std::optional<std::int64_t> job_key_;
+  const std::function<void(const JobNews&)> hear_;
 };
 
-std::unique_ptr<JobService::Subscription> Hub::subscribe(std::int64_t job_key, std::function<void()> wake) {
-  return std::make_unique<Entry>(shared_from_this(), job_key, std::move(wake));
+std::unique_ptr<JobService::Subscription> Hub::follow(std::optional<std::int64_t> job_key,
+                                                      std::function<void(const JobNews&)> hear) {
+  return std::make_unique<Entry>(shared_from_this(), job_key, std::move(hear));
 }
 
-void Hub::announce(std::int64_t job_key) {
+void Hub::announce(const JobNews& news) {
   const std::lock_guard lock(mutex_);
-  const auto found = watchers_.find(job_key);
-  if (found == watchers_.end()) return;
-  for (const Entry* entry : found->second) entry->wake();
+  for (const auto& key : {std::optional(news.job_key), std::optional<std::int64_t>()}) {
+    const auto found = followers_.find(key);
+    if (found == followers_.end()) continue;
+    for (const Entry* entry : found->second) entry->hear(news);
+  }
 }
 
 Progress progress_of(const JobRow& job) {

@@ -18,18 +18,19 @@
 
 namespace colony::server {
 
-/// Wakes the watchers of a job.
+/// Tells those who follow a job, or all jobs, what is new.
 class Hub : public std::enable_shared_from_this<Hub> {
  public:
-  std::unique_ptr<JobService::Subscription> subscribe(std::int64_t job_key, std::function<void()> wake);
-  /// Runs the wake functions of this job on the calling thread.
-  void announce(std::int64_t job_key);
+  std::unique_ptr<JobService::Subscription> follow(std::optional<std::int64_t> job_key,
+                                                   std::function<void(const JobNews&)> hear);
+  /// Runs the functions of those who follow this job, and of those who follow all, on the calling thread.
+  void announce(const JobNews& news);
 
  private:
   class Entry;
-  // Held while wake functions run: a subscription that is gone is never called. So they must not come back here.
+  // Held while these functions run: a subscription that is gone is never called. So they must not come back here.
   std::mutex mutex_;  // guards everything below
-  std::map<std::int64_t, std::set<Entry*>> watchers_;
+  std::map<std::optional<std::int64_t>, std::set<Entry*>> followers_;  // nullopt: of all jobs
 };
 
 /// One job between the moment a runner takes it and the moment the runner leaves it.

@@ -40,7 +40,10 @@ Result<JobService::Submitted> LocalJobService::submit(const NewJob& job) {
   }
   auto created = store_.create_job(job, config_.queued_max);
   if (!created) return created.error();
-  if (created->created) nudge_runners();
+  if (created->created) {
+    hub_->announce({created->job.job_key, JobNews::Kind::kChange});
+    nudge_runners();
+  }
   return Submitted{view_of(std::move(created->job)), created->created};
 }
 
@@ -105,6 +108,18 @@ Result<JobService::Submitted> LocalJobService::fork(const NewJob& job, const For
   return Submitted{view_of(std::move(made->job)), made->created};
 }
 
+Result<JobView> LocalJobService::show(std::int64_t job_key) {
+  auto job = store_.find_job(job_key);
+  if (!job) return job.error();
+  return view_of(std::move(*job));
+}
+
+std::optional<Progress> LocalJobService::live_progress(std::int64_t job_key) {
+  const std::lock_guard lock(mutex_);
+  const auto live = live_.find(job_key);
+  return live == live_.end() ? std::nullopt : std::optional(live->second->progress());
+}
+
 Result<JobService::Page> LocalJobService::list(const JobFilter& filter, std::size_t limit, const std::string& cursor) {
   auto rows = store_.list_jobs(filter, limit, cursor);
   if (!rows) return rows.error();
@@ -122,11 +137,12 @@ bool LocalJobService::wait_until_left(std::int64_t job_key) {
   return changed_.wait_for(lock, std::chrono::milliseconds(config_.command_wait_ms), left) && !live_.contains(job_key);
 }
 
-Result<JobService::Commanded> LocalJobService::command(const std::string& id, JobCommand what, LiveJob::Wish wish) {
+Result<JobService::Commanded> LocalJobService::command(const std::string& id, JobCommand what, LiveJob::Wish wish,
+                                                      const std::string& actor) {
   const auto job = store_.find_job(id);
   if (!job) return job.error();
   const std::int64_t job_key = job->job_key;
-  auto commanded = store_.command_job(job_key, what);  // durable from here on, whatever becomes of the notification
+  auto commanded = store_.command_job(job_key, what, actor);  // durable from here on, whatever becomes of the notification
   if (!commanded) return commanded.error();
   bool changed = commanded->changed;
   if (commanded->pending) {
@@ -138,7 +154,7 @@ Result<JobService::Commanded> LocalJobService::command(const std::string& id, Jo
     if (wait_until_left(job_key)) {
       // The runner has left the job: paused, cancelled, or ended by itself before the wish reached it.
       if (what == JobCommand::kResume) {
-        commanded = store_.command_job(job_key, what);
+        commanded = store_.command_job(job_key, what, actor);
         if (!commanded) return commanded.error();
         changed = changed || commanded->changed;
       } else {
@@ -152,21 +168,21 @@ Result<JobService::Commanded> LocalJobService::command(const std::string& id, Jo
       }
     }
   }
-  hub_->announce(job_key);
+  hub_->announce({job_key, JobNews::Kind::kChange});
   nudge_runners();
   return Commanded{view_of(std::move(commanded->job)), changed};
 }
 
-Result<JobService::Commanded> LocalJobService::cancel(const std::string& id) {
-  return command(id, JobCommand::kCancel, LiveJob::Wish::kCancel);
+Result<JobService::Commanded> LocalJobService::cancel(const std::string& id, const std::string& actor) {
+  return command(id, JobCommand::kCancel, LiveJob::Wish::kCancel, actor);
 }
 
-Result<JobService::Commanded> LocalJobService::pause(const std::string& id) {
-  return command(id, JobCommand::kPause, LiveJob::Wish::kPause);
+Result<JobService::Commanded> LocalJobService::pause(const std::string& id, const std::string& actor) {
+  return command(id, JobCommand::kPause, LiveJob::Wish::kPause, actor);
 }
 
-Result<JobService::Commanded> LocalJobService::resume(const std::string& id) {
-  return command(id, JobCommand::kResume, LiveJob::Wish::kNone);
+Result<JobService::Commanded> LocalJobService::resume(const std::string& id, const std::string& actor) {
+  return command(id, JobCommand::kResume, LiveJob::Wish::kNone, actor);
 }
 
 Status LocalJobService::remove(const std::string& id) {
@@ -174,17 +190,28 @@ Status LocalJobService::remove(const std::string& id) {
   if (!job) return job.error();
   const Status removed = store_.delete_job(job->job_key);
   if (!removed) return removed.error();
-  forget(job->job_key);
+  forget(*job);
   return Ok{};
 }
 
-void LocalJobService::forget(std::int64_t job_key) {
-  past_.forget(job_key);
+void LocalJobService::forget(const JobRow& job) {
+  past_.forget(job.job_key);
   {
     const std::lock_guard lock(mutex_);
-    last_pause_.erase(job_key);
+    last_pause_.erase(job.job_key);
   }
-  hub_->announce(job_key);
+  hub_->announce({job.job_key, JobNews::Kind::kRemoved, job.id});
+}
+
+Result<JobService::Edited> LocalJobService::edit(const std::string& id, const JobTextChange& change,
+                                                 const std::optional<std::vector<std::uint64_t>>& revisions,
+                                                 const std::string& actor) {
+  const auto job = store_.find_job(id);
+  if (!job) return job.error();
+  auto updated = store_.update_job_text(job->job_key, change, revisions, actor);
+  if (!updated) return updated.error();
+  if (updated->changed) hub_->announce({job->job_key, JobNews::Kind::kChange});
+  return Edited{view_of(std::move(updated->job)), updated->changed, updated->is_current};
 }
 
 Result<std::vector<Event>> LocalJobService::events(const std::string& id, const EventFilter& filter,
@@ -194,34 +221,61 @@ Result<std::vector<Event>> LocalJobService::events(const std::string& id, const 
   return store_.read_events(job->job_key, filter, limit);
 }
 
+Result<std::optional<std::uint64_t>> LocalJobService::page_end(const std::string& id, const EventFilter& filter,
+                                                               std::size_t limit) {
+  const auto job = store_.find_job(id);
+  if (!job) return job.error();
+  return store_.page_end(job->job_key, filter, limit);
+}
+
 Result<std::vector<LogRow>> LocalJobService::log(const std::string& id, std::int64_t after_index, std::size_t limit) {
   const auto job = store_.find_job(id);
   if (!job) return job.error();
   return store_.read_log(job->job_key, after_index, limit);
 }
 
+Result<std::uint64_t> LocalJobService::seq_of(const JobRow& job, std::optional<double> at_h) {
+  if (!at_h) return job.last_seq;
+  if (!std::isfinite(*at_h) || *at_h < 0.0) {
+    return Error{ErrorCode::kInvalid, "at_h is out of range", {{"at_h", "must be a finite number, 0 or more"}}};
+  }
+  if (!is_terminal(job.state) && *at_h > job.time_h) {
+    return Error{ErrorCode::kNotReached,
+                 "the job has not reached this time",
+                 {{"at_h", "the job is at " + std::to_string(job.time_h) + " h"}}};
+  }
+  if (*at_h < job.time_h) return store_.seq_at(job.job_key, *at_h);
+  return job.last_seq;
+}
+
 Result<ColonyAt> LocalJobService::colony_at(const std::string& id, std::optional<double> at_h) {
   const auto job = store_.find_job(id);
   if (!job) return job.error();
   if (job->kind != kColonyKind) return no_colony(*job);
-  if (!at_h) return past_.colony_after(*job, job->last_seq);
-  if (!std::isfinite(*at_h) || *at_h < 0.0) {
-    return Error{ErrorCode::kInvalid, "at_h is out of range", {{"at_h", "must be a finite number, 0 or more"}}};
-  }
-  if (!is_terminal(job->state) && *at_h > job->time_h) {
-    return Error{ErrorCode::kNotReached,
-                 "the job has not reached this time",
-                 {{"at_h", "the job is at " + std::to_string(job->time_h) + " h"}}};
-  }
-  std::uint64_t seq = job->last_seq;
-  if (*at_h < job->time_h) {
-    const auto found = store_.seq_at(job->job_key, *at_h);
-    if (!found) return found.error();
-    seq = *found;
-  }
-  auto colony = past_.colony_after(*job, seq);
-  if (colony && *at_h < job->time_h) colony->time_h = *at_h;  // beyond the end: the final state, at its own time
+  const auto seq = seq_of(*job, at_h);
+  if (!seq) return seq.error();
+  auto colony = past_.colony_after(*job, *seq);
+  if (colony && at_h && *at_h < job->time_h) colony->time_h = *at_h;  // beyond the end: the final state, at its own time
   return colony;
+}
+
+Result<Moment> LocalJobService::moment(const std::string& id, std::optional<double> at_h) {
+  auto job = store_.find_job(id);
+  if (!job) return job.error();
+  const auto seq = seq_of(*job, at_h);
+  if (!seq) return seq.error();
+  Moment moment{std::move(*job), *seq, {}};
+  if (*seq == moment.job.last_seq) {
+    moment.digest = moment.job.digest;
+  } else if (*seq > 0) {
+    EventFilter just_before;
+    just_before.after = *seq - 1;
+    const auto event = store_.read_events(moment.job.job_key, just_before, 1);
+    if (!event) return event.error();
+    if (event->empty()) return Error{ErrorCode::kInternal, "the stored history lacks event " + std::to_string(*seq)};
+    moment.digest = event->front().digest;
+  }
+  return moment;
 }
 
 Result<std::vector<SeriesRow>> LocalJobService::series(const std::string& id, std::size_t points) {
@@ -237,7 +291,12 @@ Result<std::vector<SeriesRow>> LocalJobService::series(const std::string& id, st
 }
 
 std::unique_ptr<JobService::Subscription> LocalJobService::subscribe(std::int64_t job_key, std::function<void()> wake) {
-  return hub_->subscribe(job_key, std::move(wake));
+  return hub_->follow(job_key, [wake = std::move(wake)](const JobNews&) { wake(); });
+}
+
+std::unique_ptr<JobService::Subscription> LocalJobService::follow(std::optional<std::int64_t> job_key,
+                                                                  std::function<void(const JobNews&)> hear) {
+  return hub_->follow(job_key, std::move(hear));
 }
 
 }  // namespace colony::server

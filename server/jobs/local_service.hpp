@@ -35,20 +35,29 @@ class LocalJobService final : public JobService {
   Result<Submitted> fork(const NewJob& job, const ForkPoint& point) override;
   Result<JobView> show(const std::string& id) override;
   std::uint64_t commit_count() const override { return store_.commit_count(); }
+  Result<JobView> show(std::int64_t job_key) override;
+  std::optional<Progress> live_progress(std::int64_t job_key) override;
   Result<Page> list(const JobFilter& filter, std::size_t limit, const std::string& cursor) override;
   Result<std::vector<std::uint64_t>> counts() override;
 
-  Result<Commanded> cancel(const std::string& id) override;
-  Result<Commanded> pause(const std::string& id) override;
-  Result<Commanded> resume(const std::string& id) override;
+  Result<Commanded> cancel(const std::string& id, const std::string& actor) override;
+  Result<Commanded> pause(const std::string& id, const std::string& actor) override;
+  Result<Commanded> resume(const std::string& id, const std::string& actor) override;
   Status remove(const std::string& id) override;
+  Result<Edited> edit(const std::string& id, const JobTextChange& change,
+                      const std::optional<std::vector<std::uint64_t>>& revisions, const std::string& actor) override;
 
   Result<std::vector<Event>> events(const std::string& id, const EventFilter& filter, std::size_t limit) override;
+  Result<std::optional<std::uint64_t>> page_end(const std::string& id, const EventFilter& filter,
+                                                std::size_t limit) override;
   Result<std::vector<LogRow>> log(const std::string& id, std::int64_t after_index, std::size_t limit) override;
   Result<ColonyAt> colony_at(const std::string& id, std::optional<double> at_h) override;
+  Result<Moment> moment(const std::string& id, std::optional<double> at_h) override;
   Result<std::vector<SeriesRow>> series(const std::string& id, std::size_t points) override;
 
   std::unique_ptr<Subscription> subscribe(std::int64_t job_key, std::function<void()> wake) override;
+  std::unique_ptr<Subscription> follow(std::optional<std::int64_t> job_key,
+                                       std::function<void(const JobNews&)> hear) override;
   Store& store() override { return store_; }
 
  private:
@@ -70,9 +79,12 @@ class LocalJobService final : public JobService {
   bool retry(std::int64_t job_key, std::uint64_t ticket);
   bool is_stalled(std::int64_t job_key, std::uint64_t ticket) const;  // mutex_ is held
   void nudge_runners();
-  void forget(std::int64_t job_key);  // it was deleted
+  void forget(const JobRow& job);  // it was deleted
   JobView view_of(JobRow job);
-  Result<Commanded> command(const std::string& id, JobCommand command, LiveJob::Wish wish);
+  /// The seq of the last event up to `at_h`.
+  Result<std::uint64_t> seq_of(const JobRow& job, std::optional<double> at_h);
+  Result<Commanded> command(const std::string& id, JobCommand command, LiveJob::Wish wish,
+                            const std::string& actor);
   /// Waits until no runner holds the job; false after command_wait_ms or when draining.
   bool wait_until_left(std::int64_t job_key);
 

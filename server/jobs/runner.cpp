@@ -238,7 +238,7 @@ void Run::append() {
                                return;
                              }
                              live->committed(stored);
-                             hub.announce(stored.job_key);
+                             hub.announce({stored.job_key, JobNews::Kind::kCommit});
                            });
 }
 

@@ -129,10 +129,10 @@ void LocalJobService::run_loop() {
       continue;
     }
     const auto& [job, live] = *taken;
-    hub_->announce(job.job_key);
+    hub_->announce({job.job_key, JobNews::Kind::kChange});
     leave(job, live, job.kind == kVerifyKind ? verify_job(environment_, job, live) : run_job(environment_, job, live));
     changed_.notify_all();
-    hub_->announce(job.job_key);
+    hub_->announce({job.job_key, JobNews::Kind::kChange});
   }
 }
 
@@ -192,7 +192,7 @@ void LocalJobService::retry_loop() {
     if (back) ++nudges_;
     lock.unlock();
     changed_.notify_all();
-    hub_->announce(job_key);
+    hub_->announce({job_key, JobNews::Kind::kChange});
     lock.lock();
   }
 }
@@ -201,7 +201,7 @@ void LocalJobService::retention_loop() {
   std::unique_lock lock(mutex_);
   while (!draining_) {
     lock.unlock();
-    expire_jobs(store_, config_, [this](const JobRow& job) { forget(job.job_key); });
+    expire_jobs(store_, config_, [this](const JobRow& job) { forget(job); });
     lock.lock();
     changed_.wait_for(lock, std::chrono::milliseconds(config_.retention_every_ms), [&] { return draining_; });
   }

@@ -59,6 +59,22 @@ struct ColonyAt {
   Digest digest;
 };
 
+/// What became of a job. kCommit: more events are stored, nothing else; kChange: perhaps its state, name or labels (or it is new);
+/// kRemoved: it is gone, and `id` is the only thing left of it.
+struct JobNews {
+  enum class Kind { kCommit, kChange, kRemoved };
+  std::int64_t job_key = 0;
+  Kind kind = Kind::kCommit;
+  std::string id = {};                     // of kRemoved
+};
+
+/// A moment of a job's history, found without folding it.
+struct Moment {
+  JobRow job;
+  std::uint64_t seq = 0;                   // the last event of it; 0: before the first
+  Digest digest;                           // after that event
+};
+
 /// Turns a stored spec into what the simulator runs (main.cpp wires the codec in, so that jobs/ needs no JSON).
 using SpecDecoder = std::function<Result<RunSpec>(const std::string& spec_json)>;
 
@@ -119,22 +135,35 @@ class JobService {
   /// As Store::commit_count. But for rates, which are of the moment, and a job that the store has stopped and could not say so, a view is
   /// as it was while this number stands.
   virtual std::uint64_t commit_count() const = 0;
+  virtual Result<JobView> show(std::int64_t job_key) = 0;
+  /// Of a job that has a runner, from memory; nullopt for all others.
+  virtual std::optional<Progress> live_progress(std::int64_t job_key) = 0;
   struct Page { std::vector<JobView> items; std::optional<std::string> next; };
   virtual Result<Page> list(const JobFilter& filter, std::size_t limit, const std::string& cursor) = 0;
   virtual Result<std::vector<std::uint64_t>> counts() = 0;
 
   /// `changed` false: the job was already in the state this leads to. Another terminal state: kConflict ("job-terminal").
   struct Commanded { JobView view; bool changed = true; };
-  virtual Result<Commanded> cancel(const std::string& id) = 0;
-  virtual Result<Commanded> pause(const std::string& id) = 0;
-  virtual Result<Commanded> resume(const std::string& id) = 0;
+  /// `actor`: who asks; it goes into the job's log with what was done.
+  virtual Result<Commanded> cancel(const std::string& id, const std::string& actor) = 0;
+  virtual Result<Commanded> pause(const std::string& id, const std::string& actor) = 0;
+  virtual Result<Commanded> resume(const std::string& id, const std::string& actor) = 0;
   virtual Status remove(const std::string& id) = 0;
+  /// As Store::update_job_text.
+  struct Edited { JobView view; bool changed = true; bool is_current = true; };
+  virtual Result<Edited> edit(const std::string& id, const JobTextChange& change,
+                              const std::optional<std::vector<std::uint64_t>>& revisions, const std::string& actor) = 0;
 
   virtual Result<std::vector<Event>> events(const std::string& id, const EventFilter& filter, std::size_t limit) = 0;
+  /// As Store::page_end.
+  virtual Result<std::optional<std::uint64_t>> page_end(const std::string& id, const EventFilter& filter,
+                                                        std::size_t limit) = 0;
   virtual Result<std::vector<LogRow>> log(const std::string& id, std::int64_t after_index, std::size_t limit) = 0;
   /// Events with time_h <= at_h (all stored ones if none). Beyond a live job's time: kNotReached, parameter "at_h".
   /// Long for a long history; kUnavailable when drain() comes meanwhile. series() likewise.
   virtual Result<ColonyAt> colony_at(const std::string& id, std::optional<double> at_h) = 0;
+  /// The moment that colony_at() would fold to; the same errors, cheap.
+  virtual Result<Moment> moment(const std::string& id, std::optional<double> at_h) = 0;
   /// `points` rows in equal steps from 0 to the end (values after the last event <= t).
   virtual Result<std::vector<SeriesRow>> series(const std::string& id, std::size_t points) = 0;
 
@@ -142,6 +171,9 @@ class JobService {
   /// and every state change of the job, until the subscription is destroyed. Progress changes only with commits.
   class Subscription { public: virtual ~Subscription() = default; };
   virtual std::unique_ptr<Subscription> subscribe(std::int64_t job_key, std::function<void()> wake) = 0;
+  /// Calls `hear` with all news of this job, or of every job if none is given; as subscribe() in all else.
+  virtual std::unique_ptr<Subscription> follow(std::optional<std::int64_t> job_key,
+                                               std::function<void(const JobNews&)> hear) = 0;
 
   virtual Store& store() = 0;
 };

@@ -205,7 +205,7 @@ void Verification::tell(const Colony& colony) {
   progress_.senescent = colony.count(Activity::kSenescent);
   progress_.fraction = static_cast<double>(seq_) / static_cast<double>(task_.to_seq);
   live_->progressed(progress_);
-  env_.hub.announce(job_.job_key);
+  env_.hub.announce({job_.job_key, JobNews::Kind::kCommit});
 }
 
 RunEnd Verification::stop(LiveJob::Wish wish) {

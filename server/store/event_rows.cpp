@@ -290,6 +290,24 @@ void complete(Connection& connection, std::int64_t job_key, Event& event) {
   }
 }
 
+/// `select` ends in a condition over ?1, the job, and ?2, the seq before; `rest` may use ?3, `number`.
+Statement filtered(Connection& connection, std::string select, const char* rest, std::int64_t job_key,
+                   const EventFilter& filter, std::uint64_t number) {
+  if (!filter.kinds.empty()) {
+    select += " AND kind IN (";  // names of ours, never a client's text
+    for (std::size_t i = 0; i < filter.kinds.size(); ++i)
+      select += (i == 0 ? "'" : ", '") + std::string(name_of(filter.kinds[i])) + "'";
+    select += ")";
+  }
+  if (filter.cell_id) select += std::string(" AND seq IN (") + kSeqsOfCell + ")";
+  constexpr auto kMax = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
+  Statement row = connection.prepare_once(select + rest);
+  row.bind(job_key).bind(static_cast<std::int64_t>(std::min(filter.after, kMax)));
+  row.bind(static_cast<std::int64_t>(std::min(number, kMax)));
+  if (filter.cell_id) row.bind(std::int64_t{*filter.cell_id});
+  return row;
+}
+
 }  // namespace
 
 void write_event(Connection& connection, std::int64_t job_key, const Event& event) {
@@ -327,30 +345,22 @@ std::size_t row_count(const Event& event) {
 
 std::vector<Event> read_events(Connection& connection, std::int64_t job_key, const EventFilter& filter,
                                std::size_t limit) {
-  std::string sql = kEventColumns;
-  if (!filter.kinds.empty()) {
-    sql += " AND kind IN (";
-    for (std::size_t i = 0; i < filter.kinds.size(); ++i) {
-      sql +=
-          (i == 0 ? "'" : ", '") + std::string(name_of(filter.kinds[i])) + "'";  // names of ours, never a client's text
-    }
-    sql += ")";
-  }
-  if (filter.cell_id) {
-    sql += std::string(" AND seq IN (") + kSeqsOfCell + ")";
-  }
-  sql += " ORDER BY seq LIMIT ?3";
-  constexpr auto kMax = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
-  Statement row = connection.prepare_once(sql);
-  row.bind(job_key).bind(static_cast<std::int64_t>(std::min(filter.after, kMax)));
-  row.bind(static_cast<std::int64_t>(std::min<std::uint64_t>(limit, kMax)));
-  if (filter.cell_id) row.bind(std::int64_t{*filter.cell_id});
+  Statement row = filtered(connection, std::string(kEventColumns), " ORDER BY seq LIMIT ?3", job_key, filter, limit);
   std::vector<Event> events;
   while (row.step()) {
     events.push_back(event_at(row));
     complete(connection, job_key, events.back());
   }
   return events;
+}
+
+std::optional<std::uint64_t> page_end(Connection& connection, std::int64_t job_key, const EventFilter& filter,
+                                      std::size_t limit) {
+  Statement row = filtered(connection, "SELECT seq FROM event WHERE job_key = ?1 AND seq > ?2",
+                           " ORDER BY seq LIMIT 2 OFFSET ?3", job_key, filter, limit - 1);
+  if (!row.step()) return std::nullopt;
+  const auto end = static_cast<std::uint64_t>(row.integer(0));
+  return row.step() ? std::optional(end) : std::nullopt;
 }
 
 void write_series(Connection& connection, std::int64_t job_key, const SeriesRow& row) {

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,9 @@ std::size_t row_count(const Event& event);
 /// Up to `limit` events that pass the filter, ascending. Call inside a read transaction.
 std::vector<Event> read_events(Connection& connection, std::int64_t job_key, const EventFilter& filter,
                                std::size_t limit);
+/// The seq of event number `limit` (from 1) of those that pass the filter, if one more follows it.
+std::optional<std::uint64_t> page_end(Connection& connection, std::int64_t job_key, const EventFilter& filter,
+                                      std::size_t limit);
 
 void write_series(Connection& connection, std::int64_t job_key, const SeriesRow& row);
 std::vector<SeriesRow> read_series(Connection& connection, std::int64_t job_key);

@@ -50,9 +50,9 @@ std::int64_t wall_time_ms() {
       .count();
 }
 
-std::string wall_time_text() { return wall_time_text(wall_time_ms()); }
+std::string wall_time_text() { return wall_time_text_at(wall_time_ms()); }
 
-std::string wall_time_text(std::int64_t at_ms) {
+std::string wall_time_text_at(std::int64_t at_ms) {
   const std::int64_t ms = std::max<std::int64_t>(at_ms, 0);
   const auto seconds = static_cast<std::time_t>(ms / 1000);
   std::tm utc{};
@@ -61,6 +61,21 @@ std::string wall_time_text(std::int64_t at_ms) {
   std::snprintf(text.data(), text.size(), "%04d-%02d-%02dT%02d:%02d:%02d.%03dZ", utc.tm_year + 1900, utc.tm_mon + 1,
                 utc.tm_mday, utc.tm_hour, utc.tm_min, utc.tm_sec, static_cast<int>(ms % 1000));
   return text.data();
+}
+
+std::optional<std::int64_t> unix_ms_of(std::string_view text) {
+  std::tm utc{};
+  int ms = 0;
+  int used = 0;
+  const std::string whole(text);
+  const int fields = std::sscanf(whole.c_str(), "%4d-%2d-%2dT%2d:%2d:%2d.%3dZ%n", &utc.tm_year, &utc.tm_mon, &utc.tm_mday,
+                                 &utc.tm_hour, &utc.tm_min, &utc.tm_sec, &ms, &used);
+  if (fields != 7 || used != static_cast<int>(whole.size())) return std::nullopt;
+  utc.tm_year -= 1900;
+  utc.tm_mon -= 1;
+  const std::int64_t value = static_cast<std::int64_t>(timegm(&utc)) * 1000 + ms;
+  if (wall_time_text_at(value) != text) return std::nullopt;  // 31 February, or another spelling
+  return value;
 }
 
 std::string new_job_id() {

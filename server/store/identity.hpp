@@ -11,8 +11,9 @@ namespace colony::server {
 
 /// Now, RFC 3339 UTC with milliseconds: 2026-11-22T05:36:07.123Z.
 std::string wall_time_text();
-/// The same of a moment, ms since 1970: texts of the years 0..9999 sort as the moments do.
-std::string wall_time_text(std::int64_t at_ms);
+/// Of a moment, ms since 1970, in the same form, and back; nullopt for any other text. Texts of the years 0..9999 sort as the moments do.
+std::string wall_time_text_at(std::int64_t unix_ms);
+std::optional<std::int64_t> unix_ms_of(std::string_view text);
 /// Now, ms since 1970.
 std::int64_t wall_time_ms();
 

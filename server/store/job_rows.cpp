@@ -57,6 +57,13 @@ void read_labels(Connection& connection, JobRow& job) {
   while (row.step()) job.labels.emplace(row.text(0), row.text(1));
 }
 
+void insert_labels(Connection& connection, std::int64_t job_key, const std::map<std::string, std::string>& labels) {
+  for (const auto& [name, value] : labels) {
+    Statement& to = connection.prepared("INSERT INTO label VALUES (?, ?, ?)");
+    to.bind(job_key).bind(std::string_view(name)).bind(std::string_view(value)).run();
+  }
+}
+
 std::optional<JobRow> first_row(Connection& connection, Statement& statement) {
   if (!statement.step()) return std::nullopt;
   JobRow job = row_at(statement);
@@ -195,14 +202,15 @@ std::int64_t insert_job_row(Connection& connection, const NewJob& job) {
   }
   to.run();
   const std::int64_t job_key = connection.last_rowid();
-  for (const auto& [name, value] : job.labels) {
-    connection.prepared("INSERT INTO label VALUES (?, ?, ?)")
-        .bind(job_key)
-        .bind(std::string_view(name))
-        .bind(std::string_view(value))
-        .run();
-  }
+  insert_labels(connection, job_key, job.labels);
   return job_key;
+}
+
+void update_job_text_row(Connection& connection, const JobRow& job) {
+  Statement& to = connection.prepared("UPDATE job SET name = ?, revision = ? WHERE job_key = ?");
+  to.bind(std::string_view(job.name)).bind(static_cast<std::int64_t>(job.revision)).bind(job.job_key).run();
+  connection.prepared("DELETE FROM label WHERE job_key = ?").bind(job.job_key).run();
+  insert_labels(connection, job.job_key, job.labels);
 }
 
 void update_job_row(Connection& connection, const JobRow& job) {

@@ -34,6 +34,8 @@ void update_job_row(Connection& connection, const JobRow& job);
 
 /// The job that the key of `job` made, if it was used with the same body; kKeyReused with another.
 Result<std::optional<JobRow>> find_submitted_row(Connection& connection, const NewJob& job);
+/// Name, labels and revision.
+void update_job_text_row(Connection& connection, const JobRow& job);
 void insert_used_key(Connection& connection, const NewJob& job, std::int64_t job_key);
 
 void insert_log_row(Connection& connection, std::int64_t job_key, const std::string& level, const std::string& message,

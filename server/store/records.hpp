@@ -67,6 +67,14 @@ struct JobRow {
   std::uint64_t cell_count = 0, active_count = 0, passive_count = 0, senescent_count = 0;
 };
 
+/// What a client wants of a job's name and labels. What is not named stays as it is.
+struct JobTextChange {
+  std::optional<std::string> name;
+  bool drops_labels = false;               // all there are, before `labels` is looked at
+  std::map<std::string, std::optional<std::string>> labels;   // without a value: this label goes
+  std::size_t labels_max = 32;             // that the job may have afterwards
+};
+
 /// One line of a job's log.
 struct LogRow {
   std::int64_t index = 0;                  // 1, 2, 3, ... within the job

@@ -9,6 +9,7 @@
 #include "server/store/data_dir.hpp"
 #include "server/store/reader_pool.hpp"
 #include "server/store/sqlite_analyses.hpp"
+#include "server/store/sqlite_tokens.hpp"
 #include "server/store/store.hpp"
 #include "server/store/writer.hpp"
 
@@ -32,7 +33,10 @@ class SqliteStore final : public Store {
                            const std::string& reason, const std::string& detail) override;
   Result<JobRow> finish_job(const EventBatch& last, JobState state, const std::string& reason,
                             const std::string& detail) override;
-  Result<Commanded> command_job(std::int64_t job_key, JobCommand command) override;
+  Result<Commanded> command_job(std::int64_t job_key, JobCommand command, const std::string& actor) override;
+  Result<TextUpdated> update_job_text(std::int64_t job_key, const JobTextChange& change,
+                                      const std::optional<std::vector<std::uint64_t>>& revisions,
+                                      const std::string& actor) override;
   Status delete_job(std::int64_t job_key) override;
   Result<std::vector<JobRow>> expire_jobs(const RetentionLimits& limits, std::int64_t now_ms) override;
   Result<std::vector<JobRow>> running_jobs() override;
@@ -41,6 +45,8 @@ class SqliteStore final : public Store {
   std::uint64_t commit_count() const override { return writer_->commit_count(); }
   Status flush() override;
   Result<std::vector<Event>> read_events(std::int64_t job_key, const EventFilter& filter, std::size_t limit) override;
+  Result<std::optional<std::uint64_t>> page_end(std::int64_t job_key, const EventFilter& filter,
+                                                std::size_t limit) override;
   Result<std::uint64_t> seq_at(std::int64_t job_key, double at_h) override;
   Result<std::vector<SeriesRow>> read_series(std::int64_t job_key) override;
 
@@ -48,6 +54,7 @@ class SqliteStore final : public Store {
   Result<std::vector<LogRow>> read_log(std::int64_t job_key, std::int64_t after_index, std::size_t limit) override;
 
   AnalysisStore& analyses() override { return *analyses_; }
+  TokenStore& tokens() override { return *tokens_; }
 
   Status check_writable(std::uint64_t free_bytes_min) override;
 
@@ -63,6 +70,7 @@ class SqliteStore final : public Store {
   std::unique_ptr<ReaderPool> readers_;                 // synchronises itself
   std::unique_ptr<Writer> writer_;                      // synchronises itself
   std::unique_ptr<SqliteAnalyses> analyses_;            // over the two above
+  std::unique_ptr<SqliteTokens> tokens_;                // likewise
 };
 
 template <class T, class Body>

@@ -54,6 +54,7 @@ SqliteStore::SqliteStore(const StoreConfig& config, std::unique_ptr<DataDir> dir
   writer_ = std::make_unique<Writer>(*write_connection_, limits,
                                      [](Connection& connection) { return sweep_deleted(connection, kSweepSeqs); });
   analyses_ = std::make_unique<SqliteAnalyses>(*writer_, *readers_, cursor_salt_);
+  tokens_ = std::make_unique<SqliteTokens>(*writer_, *readers_);
 }
 
 SqliteStore::~SqliteStore() {

@@ -18,6 +18,7 @@
 #include "engine/model/event.hpp"
 #include "server/store/analyses.hpp"
 #include "server/store/records.hpp"
+#include "server/store/tokens.hpp"
 
 namespace colony::server {
 
@@ -111,7 +112,15 @@ class Store {
   /// Resume: paused becomes queued. Already there: changed = false. Another terminal state, or a wish that a recorded cancel
   /// forbids: kConflict. `pending`: the job runs on until its runner has carried out job.command; then ask again.
   struct Commanded { JobRow job; bool changed = true; bool pending = false; };
-  virtual Result<Commanded> command_job(std::int64_t job_key, JobCommand command) = 0;
+  /// `actor`: who asked, for the log; empty: the service itself.
+  virtual Result<Commanded> command_job(std::int64_t job_key, JobCommand command, const std::string& actor = {}) = 0;
+  /// Name and labels, in any state. Decided in one transaction: if `revisions` is given and has not the job's, nothing changes and
+  /// is_current is false; what leaves all as it was changes nothing, not even the revision. More than labels_max labels: kInvalid
+  /// "/labels". Adds a log line.
+  struct TextUpdated { JobRow job; bool changed = true; bool is_current = true; };
+  virtual Result<TextUpdated> update_job_text(std::int64_t job_key, const JobTextChange& change,
+                                              const std::optional<std::vector<std::uint64_t>>& revisions,
+                                              const std::string& actor) = 0;
   /// Only terminal jobs (else kConflict); events, placements, series and log go with it.
   virtual Status delete_job(std::int64_t job_key) = 0;
   /// Marks as deleted what the limits let go at `now_ms` (since 1970): first by age, then, once nothing is being removed any more, by
@@ -132,6 +141,8 @@ class Store {
   virtual Status flush() = 0;
   /// Up to `limit` events by ascending seq. Complete: placement and woken rows joined.
   virtual Result<std::vector<Event>> read_events(std::int64_t job_key, const EventFilter& filter, std::size_t limit) = 0;
+  /// The seq of event number `limit` of those that read_events would give, if one more follows it; else nullopt. limit >= 1.
+  virtual Result<std::optional<std::uint64_t>> page_end(std::int64_t job_key, const EventFilter& filter, std::size_t limit) = 0;
   /// The last seq whose event has time_h <= at_h; 0 if none.
   virtual Result<std::uint64_t> seq_at(std::int64_t job_key, double at_h) = 0;
   /// The hourly rows, ascending.
@@ -143,6 +154,8 @@ class Store {
 
   /// Pictures and what was measured on them; lives as long as the store.
   virtual AnalysisStore& analyses() = 0;
+  /// Likewise.
+  virtual TokenStore& tokens() = 0;
 
   /// ok if a write transaction would succeed now (for readyz): database writable and at least `free_bytes_min` free on the disk.
   virtual Status check_writable(std::uint64_t free_bytes_min) = 0;

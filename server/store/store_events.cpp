@@ -68,6 +68,20 @@ Result<std::vector<Event>> SqliteStore::read_events(std::int64_t job_key, const 
   });
 }
 
+Result<std::optional<std::uint64_t>> SqliteStore::page_end(std::int64_t job_key, const EventFilter& filter,
+                                                           std::size_t limit) {
+  return readers_->read([&](Connection& connection) -> Result<std::optional<std::uint64_t>> {
+    const std::optional<JobRow> job = find_job_row(connection, job_key);
+    if (!job) return no_job();
+    CHECK(limit >= 1);
+    if (filter.kinds.empty() && !filter.cell_id) {  // dense: nothing need be counted
+      const bool goes_on = filter.after < job->last_seq && job->last_seq - filter.after > limit;
+      return goes_on ? std::optional(filter.after + limit) : std::nullopt;
+    }
+    return server::page_end(connection, job_key, filter, limit);
+  });
+}
+
 Result<std::uint64_t> SqliteStore::seq_at(std::int64_t job_key, double at_h) {
   return readers_->read([&](Connection& connection) -> Result<std::uint64_t> {
     const std::optional<JobRow> job = find_job_row(connection, job_key);

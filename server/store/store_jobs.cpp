@@ -22,7 +22,7 @@ Error wrong_state(const JobRow& job) {
 
 /// Sets the state and everything that goes with it, writes the row and a line of the log.
 void change_state(Connection& connection, JobRow& job, JobState to, const std::string& reason,
-                  const std::string& detail) {
+                  const std::string& detail, const std::string& actor = {}) {
   std::string line = std::string(name_of(job.state)) + " -> " + std::string(name_of(to));
   if (!reason.empty()) line += " (" + reason + ")";
   line += " at event " + std::to_string(job.last_seq);
@@ -35,40 +35,41 @@ void change_state(Connection& connection, JobRow& job, JobState to, const std::s
   if (to == JobState::kRunning && job.started_at.empty()) job.started_at = wall_time_text();
   if (is_terminal(to)) job.finished_at = wall_time_text();
   update_job_row(connection, job);
-  insert_log_row(connection, job.job_key, to == JobState::kFailed ? "error" : "info", line);
+  insert_log_row(connection, job.job_key, to == JobState::kFailed ? "error" : "info", line, actor);
 }
 
-Result<Store::Commanded> wish(Connection& connection, JobRow job, const std::string& command) {
+Result<Store::Commanded> wish(Connection& connection, JobRow job, const std::string& command, const std::string& actor) {
   if (job.command == command) return Store::Commanded{std::move(job), false, true};
   job.command = command;
   update_job_row(connection, job);
-  insert_log_row(connection, job.job_key, "info", command + " asked for");
+  insert_log_row(connection, job.job_key, "info", command + " asked for", actor);
   return Store::Commanded{std::move(job), true, true};
 }
 
-Result<Store::Commanded> command_cancel(Connection& connection, JobRow job) {
+Result<Store::Commanded> command_cancel(Connection& connection, JobRow job, const std::string& actor) {
   if (job.state == JobState::kCancelled) return Store::Commanded{std::move(job), false, false};
   if (is_terminal(job.state)) return wrong_state(job);
-  if (job.state == JobState::kRunning) return wish(connection, std::move(job), "cancel");
+  if (job.state == JobState::kRunning) return wish(connection, std::move(job), "cancel", actor);
   const Event last = finished_event(job, FinishReason::kCancelled);
   write_event(connection, job.job_key, last);
   job.last_seq = last.seq;
-  change_state(connection, job, JobState::kCancelled, "cancelled", "");
+  change_state(connection, job, JobState::kCancelled, "cancelled", "", actor);
   return Store::Commanded{std::move(job), true, false};
 }
 
-Result<Store::Commanded> command_pause(Connection& connection, JobRow job) {
+Result<Store::Commanded> command_pause(Connection& connection, JobRow job, const std::string& actor) {
   if (is_terminal(job.state)) return wrong_state(job);
   if (job.state == JobState::kRunning) {
     if (job.command == "cancel") return Error{ErrorCode::kConflict, "the job is being cancelled"};
-    return wish(connection, std::move(job), "pause");
+    return wish(connection, std::move(job), "pause", actor);
   }
   if (job.state == JobState::kPaused && job.reason == "user") return Store::Commanded{std::move(job), false, false};
-  change_state(connection, job, JobState::kPaused, "user", "");
+  change_state(connection, job, JobState::kPaused, "user", "", actor);
   return Store::Commanded{std::move(job), true, false};
 }
 
-Result<Store::Commanded> command_resume(Connection& connection, JobRow job, bool only_storage) {
+Result<Store::Commanded> command_resume(Connection& connection, JobRow job, bool only_storage,
+                                       const std::string& actor) {
   if (is_terminal(job.state)) return wrong_state(job);
   if (job.command == "cancel") return Error{ErrorCode::kConflict, "the job is being cancelled"};
   if (job.state != JobState::kPaused) {
@@ -76,8 +77,36 @@ Result<Store::Commanded> command_resume(Connection& connection, JobRow job, bool
     return Store::Commanded{std::move(job), false, pending};
   }
   if (only_storage && job.reason != "storage") return Store::Commanded{std::move(job), false, false};
-  change_state(connection, job, JobState::kQueued, "", "");
+  change_state(connection, job, JobState::kQueued, "", "", actor);
   return Store::Commanded{std::move(job), true, false};
+}
+
+std::map<std::string, std::string> with_changes(std::map<std::string, std::string> labels, const JobTextChange& change) {
+  if (change.drops_labels) labels.clear();
+  for (const auto& [key, value] : change.labels) {
+    if (value) {
+      labels[key] = *value;
+    } else {
+      labels.erase(key);
+    }
+  }
+  return labels;
+}
+
+/// "renamed to ...; label plate = 8; label old removed", of what differs.
+std::string text_change_line(const JobRow& job, const std::string& name,
+                             const std::map<std::string, std::string>& labels) {
+  std::string line;
+  const auto say = [&line](const std::string& part) { line += (line.empty() ? "" : "; ") + part; };
+  if (name != job.name) say(name.empty() ? "name removed" : "renamed to \"" + name + "\"");
+  for (const auto& [key, value] : labels) {
+    const auto before = job.labels.find(key);
+    if (before == job.labels.end() || before->second != value) say("label " + key + " = \"" + value + "\"");
+  }
+  for (const auto& [key, value] : job.labels) {
+    if (!labels.contains(key)) say("label " + key + " removed");
+  }
+  return line;
 }
 
 }  // namespace
@@ -94,7 +123,7 @@ Result<Store::Submitted> SqliteStore::create_job(const NewJob& job, std::size_t 
     }
     const std::int64_t job_key = insert_job_row(connection, job);
     if (!job.idempotency_key.empty()) insert_used_key(connection, job, job_key);
-    insert_log_row(connection, job_key, "info", "submitted by " + job.submitted_by);
+    insert_log_row(connection, job_key, "info", "submitted by " + job.submitted_by, job.submitted_by);
     std::optional<JobRow> row = find_job_row(connection, job_key);
     if (!row) return no_job();
     return Submitted{std::move(*row), true};
@@ -209,21 +238,49 @@ Result<JobRow> SqliteStore::finish_job(const EventBatch& last, JobState state, c
       /*in_order=*/true);
 }
 
-Result<Store::Commanded> SqliteStore::command_job(std::int64_t job_key, JobCommand command) {
+Result<Store::Commanded> SqliteStore::command_job(std::int64_t job_key, JobCommand command,
+                                                     const std::string& actor) {
   return write<Commanded>([&](Connection& connection) -> Result<Commanded> {
     std::optional<JobRow> job = find_job_row(connection, job_key);
     if (!job) return no_job();
     switch (command) {
       case JobCommand::kCancel:
-        return command_cancel(connection, std::move(*job));
+        return command_cancel(connection, std::move(*job), actor);
       case JobCommand::kPause:
-        return command_pause(connection, std::move(*job));
+        return command_pause(connection, std::move(*job), actor);
       case JobCommand::kResume:
-        return command_resume(connection, std::move(*job), false);
+        return command_resume(connection, std::move(*job), false, actor);
       case JobCommand::kResumeStorage:
-        return command_resume(connection, std::move(*job), true);
+        return command_resume(connection, std::move(*job), true, actor);
     }
     return Error{ErrorCode::kInternal, "unknown command"};
+  });
+}
+
+Result<Store::TextUpdated> SqliteStore::update_job_text(std::int64_t job_key, const JobTextChange& change,
+                                                        const std::optional<std::vector<std::uint64_t>>& revisions,
+                                                        const std::string& actor) {
+  return write<TextUpdated>([&](Connection& connection) -> Result<TextUpdated> {
+    std::optional<JobRow> job = find_job_row(connection, job_key);
+    if (!job) return no_job();
+    if (revisions && std::find(revisions->begin(), revisions->end(), job->revision) == revisions->end())
+      return TextUpdated{std::move(*job), false, false};
+    const std::string name = change.name.value_or(job->name);
+    std::map<std::string, std::string> labels = with_changes(job->labels, change);
+    if (labels.size() > change.labels_max) {
+      return Error{ErrorCode::kInvalid,
+                   "the job would have too many labels",
+                   {{"/labels", "would be " + std::to_string(labels.size()) + " labels; at most " +
+                                    std::to_string(change.labels_max) + " are allowed"}}};
+    }
+    if (name == job->name && labels == job->labels) return TextUpdated{std::move(*job), false, true};
+    const std::string line = text_change_line(*job, name, labels);
+    job->name = name;
+    job->labels = std::move(labels);
+    ++job->revision;
+    update_job_text_row(connection, *job);
+    insert_log_row(connection, job_key, "info", line, actor);
+    return TextUpdated{std::move(*job), true, true};
   });
 }
 

@@ -42,7 +42,7 @@ std::vector<std::int64_t> too_old(Connection& connection, std::uint64_t keep_day
   const std::int64_t before_ms = now_ms - static_cast<std::int64_t>(keep_days) * kDay_ms;
   Statement row = connection.prepare_once("SELECT job_key FROM job WHERE" COLONY_MAY_GO
                                           " AND finished_at < ? ORDER BY finished_at, job_key LIMIT ?");
-  row.bind(std::string_view(wall_time_text(before_ms))).bind(static_cast<std::int64_t>(kExpiredPerCall));
+  row.bind(std::string_view(wall_time_text_at(before_ms))).bind(static_cast<std::int64_t>(kExpiredPerCall));
   return keys_of(row);
 }
 

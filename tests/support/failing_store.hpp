@@ -110,14 +110,21 @@ class FailingStore final : public server::Store {
     if (set && after_set_state) after_set_state(to, reason);
     return set;
   }
-  Result<Commanded> command_job(std::int64_t job_key, server::JobCommand command) override {
-    return real_->command_job(job_key, command);
+  Result<Commanded> command_job(std::int64_t job_key, server::JobCommand command,
+                                const std::string& actor = {}) override {
+    return real_->command_job(job_key, command, actor);
+  }
+  Result<TextUpdated> update_job_text(std::int64_t job_key, const server::JobTextChange& change,
+                                      const std::optional<std::vector<std::uint64_t>>& revisions,
+                                      const std::string& actor) override {
+    return real_->update_job_text(job_key, change, revisions, actor);
   }
   Status delete_job(std::int64_t job_key) override { return real_->delete_job(job_key); }
   Result<std::vector<JobRow>> running_jobs() override { return real_->running_jobs(); }
   std::uint64_t commit_count() const override { return real_->commit_count(); }
   Status flush() override { return real_->flush(); }
   server::AnalysisStore& analyses() override { return real_->analyses(); }
+  server::TokenStore& tokens() override { return real_->tokens(); }
   Result<std::vector<Event>> read_events(std::int64_t job_key, const server::EventFilter& filter,
                                          std::size_t limit) override {
     ++event_reads;
@@ -127,6 +134,10 @@ class FailingStore final : public server::Store {
       for (Event& event : *events) tamper(event);
     }
     return events;
+  }
+  Result<std::optional<std::uint64_t>> page_end(std::int64_t job_key, const server::EventFilter& filter,
+                                                std::size_t limit) override {
+    return real_->page_end(job_key, filter, limit);
   }
   Result<std::uint64_t> seq_at(std::int64_t job_key, double at_h) override { return real_->seq_at(job_key, at_h); }
   Result<std::vector<SeriesRow>> read_series(std::int64_t job_key) override { return real_->read_series(job_key); }

@@ -59,9 +59,16 @@ class FakeJobs : public JobService {
   std::map<std::string, std::string> keys;  // idempotency key to body hash
   std::optional<Error> next_error;          // answered by the next command or submission
   std::function<void()> waker;
+  std::function<void(const JobNews&)> hearer;  // of the last follow()
+  std::optional<std::int64_t> followed_key;
+  int folds = 0;  // calls of colony_at and series, but for those of moment
+  JobTextChange asked_change;
+  std::optional<std::vector<std::uint64_t>> asked_revisions;
+  std::string asked_actor;
   std::optional<std::string> asked_cursor;
   JobFilter asked_filter;
   std::size_t asked_limit = 0;
+  std::string last_actor;
 
   /// last_seq is that of the last event visible.
   JobView view() const {
@@ -108,8 +115,17 @@ class FakeJobs : public JobService {
   std::uint64_t commit_count() const override { return does_commit ? ++commits : commits.load(); }
   mutable std::atomic<std::uint64_t> commits{0};
   bool does_commit = true;
+  Result<JobView> show(std::int64_t job_key) override {
+    if (job_key != row.job_key) return missing(std::to_string(job_key));
+    return view();
+  }
+  std::optional<Progress> live_progress(std::int64_t job_key) override {
+    return job_key == row.job_key && row.state == JobState::kRunning ? std::optional(progress) : std::nullopt;
+  }
   Result<Page> list(const JobFilter& filter, std::size_t limit, const std::string& cursor) override {
     asked_filter = filter;
+    // What the stream of a page asks for.
+    if (filter.state && !filter.kind) return *filter.state == row.state ? Page{{view()}, std::nullopt} : Page{};
     asked_limit = limit;
     asked_cursor = cursor;
     if (cursor == "made-up")
@@ -117,11 +133,11 @@ class FakeJobs : public JobService {
     return Page{{view()}, cursor.empty() ? std::optional<std::string>("a cursor&") : std::nullopt};
   }
   Result<std::vector<std::uint64_t>> counts() override { return std::vector<std::uint64_t>{1, 2, 3, 4, 5, 6}; }
-  Result<Commanded> cancel(const std::string& id) override { return command(id); }
-  Result<Commanded> pause(const std::string& id) override { return command(id); }
-  Result<Commanded> resume(const std::string& id) override { return command(id); }
+  Result<Commanded> cancel(const std::string& id, const std::string& actor) override { return command(id, actor); }
+  Result<Commanded> pause(const std::string& id, const std::string& actor) override { return command(id, actor); }
+  Result<Commanded> resume(const std::string& id, const std::string& actor) override { return command(id, actor); }
   Status remove(const std::string& id) override {
-    const auto done = command(id);
+    const auto done = command(id, {});
     if (!done) return done.error();
     return Ok{};
   }
@@ -136,12 +152,36 @@ class FakeJobs : public JobService {
     }
     return out;
   }
+  Result<Edited> edit(const std::string& id, const JobTextChange& change,
+                      const std::optional<std::vector<std::uint64_t>>& revisions, const std::string& actor) override {
+    if (id != row.id) return missing(id);
+    asked_change = change;
+    asked_revisions = revisions;
+    asked_actor = actor;
+    if (next_error) return *std::exchange(next_error, std::nullopt);
+    const bool fits = !revisions || std::find(revisions->begin(), revisions->end(), row.revision) != revisions->end();
+    if (fits) ++row.revision;
+    return Edited{view(), fits, fits};
+  }
+  Result<std::optional<std::uint64_t>> page_end(const std::string& id, const EventFilter& filter,
+                                                std::size_t limit) override {
+    const auto found = events(id, filter, limit + 1);
+    if (!found) return found.error();
+    return found->size() > limit ? std::optional((*found)[limit - 1].seq) : std::nullopt;
+  }
+  Result<Moment> moment(const std::string& id, std::optional<double> at_h) override {
+    const auto at = colony_at(id, at_h);  // dear here, but the same by its nature
+    --folds;
+    if (!at) return at.error();
+    return Moment{row, at->colony->last_seq(), at->digest};
+  }
   Result<std::vector<LogRow>> log(const std::string& id, std::int64_t after, std::size_t) override {
     if (id != row.id) return missing(id);
     if (after > 0) return std::vector<LogRow>{};
     return std::vector<LogRow>{{1, "2026-01-02T03:04:05.678Z", "info", "submitted", {}}};
   }
   Result<ColonyAt> colony_at(const std::string& id, std::optional<double> at_h) override {
+    ++folds;
     if (id != row.id) return missing(id);
     if (at_h && *at_h > 1e6) return Error{ErrorCode::kNotReached, "not there yet", {{"at_h", "beyond"}}};
     auto colony = std::make_shared<Colony>(spec.params);
@@ -152,9 +192,16 @@ class FakeJobs : public JobService {
   }
   Result<std::vector<SeriesRow>> series(const std::string& id, std::size_t points) override {
     if (id != row.id) return missing(id);
+    ++folds;
     std::vector<SeriesRow> rows(points);
     for (std::size_t i = 0; i < points; ++i) rows[i].time_h = 0.1 * static_cast<double>(i);
     return rows;
+  }
+  std::unique_ptr<Subscription> follow(std::optional<std::int64_t> job_key,
+                                       std::function<void(const JobNews&)> hear) override {
+    followed_key = job_key;
+    hearer = std::move(hear);
+    return std::make_unique<Subscription>();
   }
   std::unique_ptr<Subscription> subscribe(std::int64_t, std::function<void()> wake) override {
     waker = std::move(wake);
@@ -184,7 +231,8 @@ class FakeJobs : public JobService {
   std::string folder_;
 
   static Error missing(const std::string& id) { return {ErrorCode::kNotFound, "there is no job '" + id + "'"}; }
-  Result<Commanded> command(const std::string& id) {
+  Result<Commanded> command(const std::string& id, const std::string& actor) {
+    last_actor = actor;
     if (id != row.id) return missing(id);
     if (next_error) return *std::exchange(next_error, std::nullopt);
     return Commanded{view(), true};
@@ -194,8 +242,10 @@ class FakeJobs : public JobService {
 /// A router over the fake, and short ways to ask it.
 class ApiFixture {
  public:
-  explicit ApiFixture(api::ApiConfig with = config()) : api_(jobs, std::move(with)) { api_.add_routes(router_); }
+  explicit ApiFixture(api::ApiConfig with = config()) : api_(jobs, tokens, std::move(with)) { api_.add_routes(router_); }
   FakeJobs jobs;
+  http::TokenTable tokens;
+  http::Principal principal;
 
   static api::ApiConfig config() {
     api::ApiConfig config;
@@ -220,6 +270,7 @@ class ApiFixture {
     for (const auto& [name, value] : headers) request.headers.add(name, value);
     request.body = std::move(body);
     request.request_id = "request-1";
+    request.principal = principal;
     return router_.dispatch(request);
   }
   http::Response get(const std::string& target, std::vector<std::pair<std::string, std::string>> headers = {}) {

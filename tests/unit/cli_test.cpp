@@ -67,6 +67,21 @@ TEST_F(Cli, SettingsRiseFromFileToEnvironmentToFlag) {
   EXPECT_THAT(err(), HasSubstr("config.toml: servr: unknown key"));
 }
 
+TEST_F(Cli, ATokenGoesNowhereInTheClear) {
+  variables_["COLONY_TOKEN"] = "secret-token";
+  for (const char* server : {"http://lab.example", "http://localhost.evil.example", "http://127.0.0.1.evil.example:80",
+                             "http://10.0.0.1:8080/x"}) {
+    EXPECT_EQ(run({"counts", "--server", server}), 2) << server;
+    EXPECT_THAT(err(), HasSubstr("in the clear"));
+    EXPECT_THAT(err() + out(), ::testing::Not(HasSubstr("secret-token")));
+  }
+  EXPECT_EQ(run({"counts", "--server", closed_server()}), 3) << "this machine is asked";
+  EXPECT_EQ(run({"counts", "--server", "https://127.0.0.1:1", "--ca-file", "/no/such/file"}), 2);
+  EXPECT_THAT(err(), HasSubstr("--ca-file"));
+  write_file(".config/colony/config.toml", "ca_file = 1\n");
+  EXPECT_EQ(run({"counts"}), 2);
+}
+
 TEST_F(Cli, ProblemsNameTheField) {
   FakeServer server([](const FakeRequest&, const FakeConnection& to) {
     to.send(json_answer(
@@ -296,6 +311,49 @@ TEST_F(Cli, FoundersMakeASpec) {
   EXPECT_THAT(err(), HasSubstr("--um-per-px: must be greater than 0"));
   EXPECT_EQ(run({"founders", path("t.csv"), "--until-time", "42", "--seed", "5"}), 2);
   EXPECT_THAT(err(), HasSubstr("--um-per-px is required"));
+}
+
+TEST_F(Cli, EditSendsOneMergePatch) {
+  FakeServer server([](const FakeRequest&, const FakeConnection& to) {
+    to.send(json_answer(200, R"({"id":"01890000-0000-7000-8000-000000000001","name":"n","revision":4,"labels":{"a":"b"}})"));
+  });
+  use(server);
+  const std::string id = "01890000-0000-7000-8000-000000000001";
+  EXPECT_EQ(run({"edit", id, "--name", "n", "--label", "plate=8=x", "--remove-label", "old", "--revision", "3"}), 0);
+  EXPECT_EQ(out(), id + ": revision 4, name n, a=b\n");
+  EXPECT_EQ(run({"edit", id, "--name", "", "--remove-labels"}), 0);
+  for (const std::vector<std::string>& wrong : std::vector<std::vector<std::string>>{
+           {}, {"--label", "x"}, {"--label", "a=1", "--remove-label", "a"}, {"--revision", "x", "--name", "n"}, {"--remove-labels", "--label", "a=b"}}) {
+    std::vector<std::string> arguments = {"edit", id};
+    arguments.insert(arguments.end(), wrong.begin(), wrong.end());
+    EXPECT_EQ(run(arguments), 2);
+  }
+  const auto requests = server.requests();
+  ASSERT_EQ(requests.size(), 2u);
+  EXPECT_EQ(requests[0].line(), "PATCH /v1/jobs/" + id + " HTTP/1.1");
+  EXPECT_EQ(requests[0].body, R"({"name":"n","labels":{"plate":"8=x","old":null}})");
+  EXPECT_EQ(requests[0].header("Content-Type"), "application/merge-patch+json");
+  EXPECT_EQ(requests[0].header("If-Match"), "\"3.0\"");
+  EXPECT_EQ(requests[1].body, R"({"name":null,"labels":null})");
+  EXPECT_EQ(requests[1].header("If-Match"), "");
+}
+
+TEST_F(Cli, ShowWaitsByTheTagOfWhatIs) {
+  std::atomic<int> count{0};
+  FakeServer server([&](const FakeRequest& request, const FakeConnection& to) {
+    if (request.header("Prefer").empty()) return to.send(json_answer(200, R"({"state":"queued"})", "ETag: \"2.7\"\r\n"));
+    to.send(count++ == 0 ? json_answer(200, R"({"state":"running"})") : "HTTP/1.1 304 X\r\nConnection: close\r\n\r\n");
+  });
+  use(server);
+  const std::string id = "01890000-0000-7000-8000-000000000001";
+  EXPECT_EQ(run({"show", id, "--wait", "30"}), 0);
+  EXPECT_EQ(out(), "state: running\n");
+  EXPECT_EQ(run({"show", id, "--wait", "30"}), 0);
+  EXPECT_EQ(out(), "state: queued\n") << "304: as it was";
+  const auto requests = server.requests();
+  EXPECT_EQ(requests.at(1).header("If-None-Match"), "\"2.7\"");
+  EXPECT_EQ(requests.at(1).header("Prefer"), "wait=30");
+  EXPECT_EQ(run({"show", id, "--wait", "61"}), 2);
 }
 
 }  // namespace

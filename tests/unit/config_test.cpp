@@ -100,7 +100,8 @@ TEST(Config, UnknownOrWrongEnvironmentIsAnError) {
     return places(given({}, {{"HOME", "/h"}, {name, value}}));
   };
   EXPECT_THAT(with("COLONY_JOBS_SPEED", "1"), ElementsAre("COLONY_JOBS_SPEED"));
-  EXPECT_THAT(with("COLONY_AUTH_MODE", "required"), ElementsAre("COLONY_AUTH_MODE"));
+  EXPECT_THAT(with("COLONY_AUTH_MODES", "required"), ElementsAre("COLONY_AUTH_MODES"));
+  EXPECT_THAT(with("COLONY_LOG_LEVEL", "debug"), ElementsAre("COLONY_LOG_LEVEL"));
   EXPECT_THAT(with("COLONY_JOBS_CONCURRENT_MAX", "two"), ElementsAre("COLONY_JOBS_CONCURRENT_MAX"));
   EXPECT_THAT(with("COLONY_JOBS_CONCURRENT_MAX", ""), ElementsAre("COLONY_JOBS_CONCURRENT_MAX"));
   EXPECT_THAT(with("COLONY_SERVER", "http://x"), ElementsAre()) << "belongs to the command line";
@@ -158,12 +159,72 @@ TEST(Config, OnlyLoopbackIsListenedOn) {
   for (const char* right : {"127.0.0.1:0", "127.1.2.3:80", "[::1]:65535", "localhost:1"}) {
     EXPECT_TRUE(given({"--listen", right})) << right;
   }
-  for (const char* wrong :
-       {"0.0.0.0:8080", "192.168.1.1:8080", "[::]:80", "example.org:80", "127.0.0.1", "127.0.0.1:", ":80",
-        "127.0.0.1:65536", "127.0.0.1:x", "127.0.0:80", "127.0.0.256:80", "127.0.0.1.example.org:80", ""}) {
+  for (const char* wrong : {"example.org:80", "127.0.0.1", "127.0.0.1:", ":80", "127.0.0.1:65536", "127.0.0.1:x",
+                            "127.0.0:80", "127.0.0.256:80", "127.0.0.1.example.org:80", ""}) {
     EXPECT_THAT(places(given({"--listen", wrong})), ElementsAre("--server.listen")) << wrong;
   }
-  EXPECT_THAT(given({"--listen", "0.0.0.0:80"}).error().fields.at(0).message, HasSubstr("tokens and TLS"));
+}
+
+TEST(Config, OtherAddressesNeedTokensAndTlsOrAProxy) {
+  const auto listens = [](std::vector<std::string> more) {
+    more.insert(more.begin(), {"--listen", "0.0.0.0:80"});
+    return given(more);
+  };
+  for (const char* address : {"0.0.0.0:8080", "192.168.1.1:8080", "[::]:80"}) {
+    EXPECT_THAT(places(given({"--listen", address})), ElementsAre("server.listen", "server.listen")) << address;
+  }
+  EXPECT_THAT(listens({}).error().fields.at(0).message, HasSubstr("auth.mode"));
+  EXPECT_THAT(listens({"--auth.mode=required"}).error().fields.at(0).message, HasSubstr("in the clear"));
+  EXPECT_THAT(places(listens({"--server.behind-proxy=true"})), ElementsAre("server.listen")) << "a proxy is no token";
+  EXPECT_TRUE(listens({"--auth.mode=required", "--server.behind-proxy=true"}));
+  const auto with_tls = listens({"--auth.mode=required", "--tls.certificate=c", "--tls.key=k"});
+  ASSERT_TRUE(with_tls);
+  EXPECT_TRUE(with_tls->config.http.tokens_required);
+  EXPECT_EQ(with_tls->config.http.tls_key, "k");
+  EXPECT_THAT(places(given({"--tls.certificate=c"})), ElementsAre("tls.key"));
+  EXPECT_THAT(places(given({"--tls.key=c"})), ElementsAre("tls.certificate"));
+  EXPECT_THAT(places(given({"--server.trust-forwarded-for=true"})), ElementsAre("server.trust_forwarded_for"));
+}
+
+TEST(Config, EachSettingOfTheGateHasItsOwnError) {
+  for (const char* wrong : {"auth.mode=on", "log.format=xml", "server.behind-proxy=yes", "server.trust-forwarded-for=1",
+                            "limits.count-loopback=2", "limits.connections-per-address-max=0",
+                            "limits.requests-per-s=-1", "limits.requests-burst=0", "limits.failed-tokens-per-min=x",
+                            "limits.handshake-timeout-ms=0", "limits.header-timeout-ms=9", "limits.body-timeout-ms=3600001",
+                            "limits.idle-timeout-ms=1.5", "limits.write-timeout-ms=x"}) {
+    const std::string flag = std::string("--") + wrong;
+    EXPECT_THAT(places(given({flag})), ElementsAre(flag.substr(0, flag.find('=')))) << wrong;
+  }
+  for (const char* origin : {"*", "null", "lab.example", "https://", "https://lab.example/", "https://Lab.example",
+                             "ftp://lab.example", "https://a b", "https://a@b", "https://a,"}) {
+    EXPECT_THAT(places(given({std::string("--server.cors-origins=") + origin})), ElementsAre("--server.cors-origins")) << origin;
+  }
+  const ConfigFile file(
+      "[server]\ncors_origins = [\"https://lab.example\", \"http://localhost:3000\"]\nbehind_proxy = true\n"
+      "[limits]\nrequests_per_s = 0\nheader_timeout_ms = 250\ncount_loopback = true\n[log]\nformat = \"json\"\n");
+  const auto right = given({"--config", file.path()});
+  ASSERT_TRUE(right) << places(right).at(0);
+  EXPECT_THAT(right->config.http.cors_origins, ElementsAre("https://lab.example", "http://localhost:3000"));
+  EXPECT_TRUE(right->config.http.behind_proxy);
+  EXPECT_EQ(right->config.http.requests_per_s, 0.0);
+  EXPECT_EQ(right->config.http.header_timeout_ms, 250);
+  EXPECT_EQ(right->config.log_format, LogFormat::kJson);
+  const ConfigFile wrong("[server]\nbehind_proxy = \"true\"\n");
+  EXPECT_THAT(places(given({"--config", wrong.path()})), ElementsAre(HasSubstr("server.behind_proxy")));
+}
+
+TEST(Config, TokenCreateTakesItsOwnFlagsAndTheServers) {
+  const auto result = given({"token", "create", "--name", "ann", "--scope", "admin", "--expires-h", "24", "--data", "/d"});
+  ASSERT_TRUE(result) << places(result).at(0);
+  ASSERT_TRUE(result->token);
+  EXPECT_EQ(result->token->name, "ann");
+  EXPECT_EQ(result->token->scope, "admin");
+  EXPECT_EQ(result->token->expires_h, 24.0);
+  EXPECT_EQ(result->config.store.data_dir, "/d");
+  EXPECT_FALSE(given({})->token);
+  EXPECT_FALSE(given({"token"}));
+  EXPECT_FALSE(given({"token", "create", "--name", "ann", "--scope", "admin"})) << "how long is never guessed";
+  EXPECT_THAT(places(given({"token", "create", "--name=a", "--scope=read", "--expires-h=inf"})), ElementsAre("--expires-h"));
 }
 
 TEST(Config, TheBasePathIsCheckedAndTheDiskLimitsAreRead) {

@@ -49,8 +49,9 @@ class GrowingJobs : public FakeJobs {
       stored = visible;
       if (is_end) row.state = JobState::kSucceeded;
     }
-    hub_->announce(row.job_key);
+    hub_->announce({row.job_key, JobNews::Kind::kCommit});
   }
+  using FakeJobs::show;
   Result<JobView> show(const std::string& id) override {
     const std::lock_guard lock(mutex_);
     return FakeJobs::show(id);
@@ -65,7 +66,7 @@ class GrowingJobs : public FakeJobs {
                               history.begin() + static_cast<std::ptrdiff_t>(std::min(end, begin + limit)));
   }
   std::unique_ptr<Subscription> subscribe(std::int64_t job_key, std::function<void()> wake) override {
-    return hub_->subscribe(job_key, std::move(wake));
+    return hub_->follow(job_key, [wake = std::move(wake)](const JobNews&) { wake(); });
   }
   std::atomic<int> read_count{0};
 

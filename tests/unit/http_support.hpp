@@ -197,13 +197,14 @@ class TestServer {
     router_.add("POST", "/echo", [](const Request& request) { return text(request.body); });
     if (shape) shape(router_);
     config.port = 0;
-    auto server = Server::create(std::move(config), router_, [this](const AccessRecord& record) {
+    auto server = Server::create(std::move(config), router_, tokens, [this](const AccessRecord& record) {
       if (on_access) on_access(record);
     });
     if (!server) throw std::runtime_error(server.error().message);
     server_ = std::move(*server);
   }
 
+  TokenTable tokens;
   /// Before run().
   std::function<void(const AccessRecord&)> on_access;
 

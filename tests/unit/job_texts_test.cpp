@@ -29,7 +29,8 @@ class KeptAnswers : public ::testing::Test {
   http::Router router;
 
  private:
-  api::Api api_{jobs, ApiFixture::config()};
+  http::TokenTable tokens_;
+  api::Api api_{jobs, tokens_, ApiFixture::config()};
 };
 
 TEST(JobText, IsThatOfTheValue) {
@@ -38,8 +39,8 @@ TEST(JobText, IsThatOfTheValue) {
   for (const char* detail : {"", "why\n"}) {
     jobs.row.detail = detail;
     std::string text = "before ";
-    api::append_job_text(text, jobs.view());
-    EXPECT_EQ(text, "before " + api::to_text(api::encode_job(jobs.view())));
+    api::append_job_text(text, jobs.view(), "/base");
+    EXPECT_EQ(text, "before " + api::to_text(api::encode_job(jobs.view(), "/base")));
   }
 }
 
@@ -73,6 +74,7 @@ TEST_F(KeptAnswers, AreForgottenWithTheNextCommit) {
 TEST_F(KeptAnswers, AreNotOfAReadingThatACommitOvertook) {
   class Overtaken : public FakeJobs {
    public:
+    using FakeJobs::show;
     Result<JobView> show(const std::string& id) override {
       const auto view = FakeJobs::show(id);
       ++commits;
@@ -81,7 +83,7 @@ TEST_F(KeptAnswers, AreNotOfAReadingThatACommitOvertook) {
   };
   Overtaken overtaken;
   overtaken.does_commit = false;
-  api::JobTexts texts(overtaken);
+  api::JobTexts texts(overtaken, "");
   ASSERT_TRUE(texts.read(kJobId));
   EXPECT_EQ(texts.find(kJobId), nullptr);
 }

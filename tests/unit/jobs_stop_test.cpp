@@ -37,7 +37,7 @@ TEST_F(JobsTest, AJobResumedBeforeItsRetryHasOneRunner) {
   const JobView stopped = *service_->show(id);
   EXPECT_EQ(stopped.job.reason, "storage");
   store_->heal();
-  ASSERT_TRUE(service_->resume(id));
+  ASSERT_TRUE(service_->resume(id, "someone"));
   watch.until_seq(stopped.job.last_seq + 5);
   EXPECT_EQ(service_->show(id)->job.state, JobState::kRunning);
   retry.open();
@@ -71,15 +71,15 @@ TEST_F(JobsTest, ARunnerThatLeavesDoesNotTakeTheNextOnesPlace) {
   const std::string id = submit(new_job(3, 100'000));
   Watch watch(*service_, id);
   watch.until_seq(5);
-  ASSERT_TRUE(service_->pause(id));
+  ASSERT_TRUE(service_->pause(id, "someone"));
   leaving.wait_until_reached();  // paused in the store, its runner still there
-  ASSERT_TRUE(service_->resume(id));
+  ASSERT_TRUE(service_->resume(id, "someone"));
   taken.wait_until_reached();  // by the other runner
   taken.open();
   leaving.open();
   const std::uint64_t seq = service_->show(id)->job.last_seq;
   watch.until_seq(seq + 5);
-  ASSERT_TRUE(service_->pause(id));  // which must reach the second runner
+  ASSERT_TRUE(service_->pause(id, "someone"));  // which must reach the second runner
   EXPECT_EQ(watch.until([](const JobView& view) { return view.job.state != JobState::kRunning; }).job.state,
             JobState::kPaused);
 }
@@ -95,18 +95,18 @@ TEST_F(JobsTest, AWishStopsAStepThatTakesLong) {
   const auto running = [](const JobView& view) { return view.job.state == JobState::kRunning; };
   Watch watch(*service_, id);
   watch.until(running);
-  const auto paused = service_->pause(id);
+  const auto paused = service_->pause(id, "someone");
   ASSERT_TRUE(paused) << paused.error().message;
   EXPECT_EQ(paused->view.job.state, JobState::kPaused);
   EXPECT_EQ(paused->view.job.last_seq, 0U);
-  ASSERT_TRUE(service_->resume(id));
+  ASSERT_TRUE(service_->resume(id, "someone"));
   watch.until(running);
   service_->drain();
   EXPECT_EQ(service_->show(id)->job.state, JobState::kRunning);
   EXPECT_EQ(service_->show(id)->job.last_seq, 0U);
   open(config);
   start();
-  const auto cancelled = service_->cancel(id);
+  const auto cancelled = service_->cancel(id, "someone");
   ASSERT_TRUE(cancelled) << cancelled.error().message;
   EXPECT_EQ(cancelled->view.job.state, JobState::kCancelled);
   EXPECT_EQ(cancelled->view.job.last_seq, 1U);

@@ -60,19 +60,19 @@ TEST_F(JobsTest, PauseAndResumeChangeNothing) {
   const std::string id = submit(new_job(3, 40));
   Watch watch(*service_, id);
   watch.until_seq(5);
-  const auto paused = service_->pause(id);
+  const auto paused = service_->pause(id, "someone");
   ASSERT_TRUE(paused) << paused.error().message;
   EXPECT_EQ(paused->view.job.state, JobState::kPaused);
   EXPECT_EQ(paused->view.job.reason, "user");
   EXPECT_TRUE(paused->changed);
-  EXPECT_FALSE(service_->pause(id)->changed);
+  EXPECT_FALSE(service_->pause(id, "someone")->changed);
   EXPECT_EQ(events(id).size(), paused->view.job.last_seq);
-  EXPECT_TRUE(service_->resume(id)->changed);
+  EXPECT_TRUE(service_->resume(id, "someone")->changed);
   EXPECT_EQ(watch.until_ended().job.state, JobState::kSucceeded);
   EXPECT_EQ(events(id), undisturbed(3, 40));
-  EXPECT_EQ(service_->pause(id).error().code, ErrorCode::kConflict);
-  EXPECT_EQ(service_->resume(id).error().code, ErrorCode::kConflict);
-  EXPECT_EQ(service_->cancel(id).error().code, ErrorCode::kConflict);
+  EXPECT_EQ(service_->pause(id, "someone").error().code, ErrorCode::kConflict);
+  EXPECT_EQ(service_->resume(id, "someone").error().code, ErrorCode::kConflict);
+  EXPECT_EQ(service_->cancel(id, "someone").error().code, ErrorCode::kConflict);
 }
 
 TEST_F(JobsTest, APaceChangesNothingButTheTime) {
@@ -105,10 +105,10 @@ TEST_F(JobsTest, CancelEndsARunningJob) {
   const std::string id = submit(new_job(4, 100'000));
   Watch(*service_, id).until_seq(5);
   EXPECT_EQ(service_->remove(id).error().code, ErrorCode::kConflict);
-  const auto cancelled = service_->cancel(id);
+  const auto cancelled = service_->cancel(id, "someone");
   ASSERT_TRUE(cancelled) << cancelled.error().message;
   EXPECT_EQ(cancelled->view.job.state, JobState::kCancelled);
-  EXPECT_FALSE(service_->cancel(id)->changed);
+  EXPECT_FALSE(service_->cancel(id, "someone")->changed);
   const std::vector<Event> history = events(id);
   ASSERT_EQ(history.size(), cancelled->view.job.last_seq);
   EXPECT_EQ(std::get<Finished>(history.back().body).reason, FinishReason::kCancelled);
@@ -122,10 +122,10 @@ TEST_F(JobsTest, CancelEndsARunningJob) {
 
 TEST_F(JobsTest, CancelsAQueuedJobWithoutARunner) {
   const std::string id = submit(new_job(4, 10));  // not started: nobody takes it
-  EXPECT_TRUE(service_->cancel(id)->changed);
+  EXPECT_TRUE(service_->cancel(id, "someone")->changed);
   EXPECT_EQ(service_->show(id)->job.state, JobState::kCancelled);
   EXPECT_EQ(events(id).size(), 1U);
-  EXPECT_EQ(service_->cancel("no such job").error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(service_->cancel("no such job", "someone").error().code, ErrorCode::kNotFound);
 }
 
 TEST_F(JobsTest, GoesOnAfterADrainWithTheSameBytes) {

@@ -116,7 +116,7 @@ TEST(Results, SeriesImageAndLog) {
   auto log = fixture.get(kJob + "/log");
   EXPECT_EQ(header(log, "Content-Type"), "application/x-ndjson");
   EXPECT_EQ(body_of(log),
-            "{\"index\":1,\"at\":\"2026-01-02T03:04:05.678Z\",\"level\":\"info\",\"message\":\"submitted\"}\n");
+            "{\"index\":1,\"at\":\"2026-01-02T03:04:05.678Z\",\"level\":\"info\",\"message\":\"submitted\",\"actor\":null}\n");
 }
 
 }  // namespace

@@ -20,7 +20,7 @@ const commonHeaders = new Set(['allow', 'cache-control', 'connection', 'content-
   'strict-transport-security', 'transfer-encoding', 'vary', 'www-authenticate', 'x-content-type-options', 'x-frame-options', 'x-request-id']);
 
 /** What the request gate may answer to anything before it looks at the path. */
-const gateStatuses = [400, 403, 408, 413, 414, 421, 431, 503];
+const gateStatuses = [400, 401, 403, 408, 413, 414, 421, 429, 431, 503];
 
 export class Contract {
   constructor(openapi) {

@@ -43,7 +43,7 @@ export function send(port, method, path, { headers = {}, json, body } = {}) {
 }
 
 /** The complete responses in `bytes`, in order (Content-Length, chunked, or to the end when closed). */
-export function parseResponses(bytes, closed) {
+export function parseResponses(bytes, closed, { isHead = false, foreign = false } = {}) {
   const found = [];
   let at = 0;
   for (;;) {
@@ -51,12 +51,15 @@ export function parseResponses(bytes, closed) {
     if (headEnd < 0) return found;
     const lines = bytes.subarray(at, headEnd).toString('latin1').split('\r\n');
     const status = Number(/^HTTP\/1\.1 (\d{3})/.exec(lines[0])?.[1]);
+    if (!status && foreign) return found;  // another server may answer a line of nothing with a page of nothing (HTTP/0.9)
     if (!status) throw new Error(`not an HTTP response: ${lines[0]}`);
     const headers = {};
     for (const line of lines.slice(1)) headers[line.slice(0, line.indexOf(':')).toLowerCase()] = line.slice(line.indexOf(':') + 1).trim();
     let from = headEnd + 4;
     let body;
-    if (headers['content-length'] !== undefined) {
+    if (isHead && found.length === 0) {
+      body = Buffer.alloc(0);
+    } else if (headers['content-length'] !== undefined) {
       const length = Number(headers['content-length']);
       if (bytes.length < from + length) return found;
       body = bytes.subarray(from, from + length);
@@ -85,17 +88,18 @@ export function parseResponses(bytes, closed) {
 
 /**
  * Sends exactly these bytes and collects what comes back until the server closes, or until `count` responses are there.
- * Gives {responses, closed}; `closed` says that the server ended the connection.
+ * Gives {responses, closed, socket}; `closed` says that the server ended the connection. `isHead`: the first is a HEAD; `foreign`: another
+ * server's; `keep`: the socket stays open, and is the caller's.
  */
-export function sendRaw(port, bytes, { count = Infinity, limit_ms = answerMax_ms } = {}) {
+export function sendRaw(port, bytes, { count = Infinity, limit_ms = answerMax_ms, isHead = false, foreign = false, keep = false } = {}) {
   let socket;
   const exchange = new Promise((done, fail) => {
     socket = net.connect(port, '127.0.0.1');
     let received = Buffer.alloc(0);
     const finish = (closed) => {
       try {
-        const responses = parseResponses(received, closed);
-        if (closed || responses.length >= count) done({ responses, closed });
+        const responses = parseResponses(received, closed, { isHead, foreign });
+        if (closed || responses.length >= count) done({ responses, closed, socket });
       } catch (error) {
         fail(error);
       }
@@ -109,5 +113,5 @@ export function sendRaw(port, bytes, { count = Infinity, limit_ms = answerMax_ms
     socket.on('error', (error) => (['ECONNRESET', 'EPIPE'].includes(error.code) ? undefined : fail(error)));
     socket.on('close', () => finish(true));
   });
-  return within(limit_ms, exchange, 'a raw exchange to end').finally(() => socket.destroy());
+  return within(limit_ms, exchange, 'a raw exchange to end').finally(() => keep || socket.destroy());
 }

@@ -1,7 +1,7 @@
 // server: a real colonyd on a free loopback port, in a data folder of its own, ended by its pid.
 // Promise: a server that crashes, prints a sanitizer's report or does not end cleanly fails the test that started it.
 import assert from 'node:assert/strict';
-import { spawn } from 'node:child_process';
+import { execFileSync, spawn, spawnSync } from 'node:child_process';
 import { existsSync, mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { dirname, join, resolve } from 'node:path';
@@ -37,9 +37,10 @@ export function cleanEnvironment() {
 }
 
 export class Server {
-  constructor(data, args) {
+  constructor(data, args, token) {
     assert.ok(existsSync(serverBinary), `${serverBinary} is not built`);
     this.data = data;
+    this.token = token;  // sent with every request of ours
     this.out = '';
     this.err = '';
     this.expectedToDie = false;
@@ -58,8 +59,11 @@ export class Server {
       this.child.on('error', fail);
       this.child.stdout.on('data', (bytes) => {
         this.out += bytes;
-        const match = /^listening on http:\/\/127\.0\.0\.1:(\d+)\n/m.exec(this.out);
-        if (match) done(Number(match[1]));
+        const match = /^listening on (https?):\/\/127\.0\.0\.1:(\d+)(\/\S*)?\n/m.exec(this.out);
+        if (!match) return;
+        this.isEncrypted = match[1] === 'https';
+        this.base = match[3] ?? '';
+        done(Number(match[2]));
       });
       this.exited.then(({ code, signal }) => fail(new Error(`colonyd ended (${code ?? signal}) before it listened:\n${this.err}`)));
     });
@@ -76,7 +80,8 @@ export class Server {
       this.contract = contract;
       return this;
     }
-    const openapi = await send(this.port, 'GET', '/openapi.json');
+    if (this.isEncrypted) return this;  // the test asks for itself
+    const openapi = await send(this.port, 'GET', `${this.base}/openapi.json`);
     assert.equal(openapi.status, 200);
     this.contract = new Contract(openapi.json);
     return this;
@@ -84,7 +89,9 @@ export class Server {
 
   /** One request; the answer is held against the OpenAPI document the server itself gives. */
   async request(method, path, options = {}) {
-    const response = await send(this.port, method, path, options);
+    const wanted = { ...(this.token ? { Authorization: `Bearer ${this.token}` } : {}), ...options.headers };
+    const headers = Object.fromEntries(Object.entries(wanted).filter(([, value]) => value !== null));  // null: not even the token
+    const response = await send(this.port, method, this.base + path, { ...options, headers });
     this.contract.check(method, path, response, options);
     return response;
   }
@@ -114,9 +121,22 @@ export class Server {
   }
 }
 
+/** A token made with the server stopped. */
+export function createToken(data, name, scope, expires_h = 1) {
+  return execFileSync(serverBinary, ['token', 'create', '--name', name, '--scope', scope, '--expires-h', String(expires_h), '--data', data],
+    { env: { ...cleanEnvironment(), HOME: data }, encoding: 'utf8', stdio: ['ignore', 'pipe', 'pipe'] }).trim();
+}
+
+/** A server that is expected not to start: its exit code and what it said. */
+export function refusedStart(data, args) {
+  const { status, stderr } = spawnSync(serverBinary, ['--data', data, ...args],
+    { env: { ...cleanEnvironment(), HOME: data }, encoding: 'utf8', timeout: startMax_ms });
+  return { status, stderr };
+}
+
 /** Starts a server for a test and stops it at the test's end. Without `data` it gets a folder that goes with it. */
-export async function startServer(t, { data, args = [] } = {}) {
-  const server = new Server(data ?? temporaryFolder(t), args);
+export async function startServer(t, { data, args = [], token } = {}) {
+  const server = new Server(data ?? temporaryFolder(t), args, token);
   cleanup(t, () => server.stop());
   return server.ready();
 }

@@ -1,0 +1,122 @@
+// Handlers of one job: look at it, wait for a change, edit name and labels.
+#include <algorithm>
+#include <memory>
+#include <utility>
+
+#include "server/api/api.hpp"
+#include "server/api/codec_patch.hpp"
+#include "server/api/job_texts.hpp"
+
+namespace colony::server::api {
+namespace {
+
+constexpr std::string_view kPreferenceApplied = "Preference-Applied";
+
+bool names_revision(const TagList& list, const JobRow& job, bool also_weak) {
+  const auto revisions = revisions_of(list, also_weak);
+  return std::find(revisions.begin(), revisions.end(), job.revision) != revisions.end();
+}
+
+const Endpoint& show_endpoint() {
+  static const Endpoint& endpoint = *std::find_if(
+      endpoints().begin(), endpoints().end(), [](const Endpoint& one) { return one.operation_id == "showJob"; });
+  return endpoint;
+}
+
+/// The answer to a request that waits until the job has another revision. It holds a connection and no thread; commits of events
+/// do not wake it.
+class JobWait : public http::LaterAnswer {
+ public:
+  /// One of context.waiting is counted for it already.
+  JobWait(Context& context, const Call& call, std::int64_t job_key, int wait_s)
+      : context_(context),
+        request_(call.request),
+        call_{request_, call.query, call.media, call.if_match, call.if_none_match},
+        job_key_(job_key),
+        wait_s_(wait_s) {}
+  ~JobWait() override { --context_.waiting; }
+
+  void on_ready(std::function<void()> wake) override {
+    subscription_ = context_.jobs.follow(job_key_, [wake = std::move(wake)](const JobNews& news) {
+      if (news.kind != JobNews::Kind::kCommit) wake();
+    });
+  }
+
+  std::unique_ptr<http::Response> ask(bool is_last) override {
+    const auto view = context_.jobs.show(call_.id());
+    if (view && !is_last && names_revision(*call_.if_none_match, view->job, true)) return nullptr;
+    auto response = std::make_unique<http::Response>(view ? job_response(context_, 200, *view)
+                                                          : failure(view.error(), call_));
+    if (view) response->headers.set(kPreferenceApplied, "wait=" + std::to_string(wait_s_));
+    apply_conditions(show_endpoint(), call_, *response);
+    return response;
+  }
+
+  std::chrono::milliseconds wait_max() const override { return std::chrono::seconds(wait_s_); }
+
+ private:
+  Context& context_;
+  const http::Request request_;
+  const Call call_;  // of request_
+  const std::int64_t job_key_;
+  const int wait_s_;
+  std::unique_ptr<JobService::Subscription> subscription_;
+};
+
+}  // namespace
+
+http::Response no_such_revision(const Call& call, const JobRow& job) {
+  return problem_response(
+      ProblemKind::kPreconditionFailed,
+      {ErrorCode::kConflict, "the job is at revision " + std::to_string(job.revision) + "; nothing was changed",
+       {{"If-Match", "names no tag of revision " + std::to_string(job.revision) + " (a weak tag names none)"}}},
+      call.request.request_id);
+}
+
+std::optional<http::Response> refused_by_if_match(Context& context, const Call& call) {
+  if (!call.if_match || call.if_match->is_any) return std::nullopt;
+  const auto view = context.jobs.show(call.id());
+  if (!view) return failure(view.error(), call);
+  if (names_revision(*call.if_match, view->job, false)) return std::nullopt;
+  return no_such_revision(call, view->job);
+}
+
+http::Response get_job(Context& context, const Call& call) {
+  const auto wait_s = wait_wished(call.request.headers);
+  if (!wait_s || !call.if_none_match) {
+    const auto text = context.job_texts->read(call.id());
+    return text ? job_answer(**text) : failure(text.error(), call);
+  }
+  const auto view = context.jobs.show(call.id());
+  if (!view) return failure(view.error(), call);
+  const bool is_to_wait = wait_s && call.if_none_match && names_revision(*call.if_none_match, view->job, true);
+  // A wish may be left alone (RFC 7240): with half of the connections waiting, the others are for those who do not. The answer then
+  // lacks Preference-Applied.
+  if (is_to_wait && !context.draining) {
+    if (context.waiting.fetch_add(1) < std::max<std::size_t>(context.config.connections_max / 2, 1)) {
+      http::Response response;
+      response.later = std::make_unique<JobWait>(context, call, view->job.job_key, *wait_s);
+      return response;
+    }
+    --context.waiting;
+  }
+  http::Response response = job_response(context, 200, *view);
+  if (wait_s && call.if_none_match && !is_to_wait)
+    response.headers.set(kPreferenceApplied, "wait=" + std::to_string(*wait_s));
+  return response;
+}
+
+http::Response patch_job(Context& context, const Call& call) {
+  const auto body = parse_json(call.request.body);
+  if (!body) return failure(body.error(), call);
+  const auto change = decode_job_patch(*body);
+  if (!change) return failure(change.error(), call);
+  std::optional<std::vector<std::uint64_t>> revisions;
+  if (call.if_match && !call.if_match->is_any) revisions = revisions_of(*call.if_match, false);
+  const auto edited = context.jobs.edit(call.id(), *change, revisions, call.request.principal.name);
+  if (!edited) return failure(edited.error(), call);
+  if (!edited->is_current) return no_such_revision(call, edited->view.job);
+  return job_response(context, 200, edited->view);
+}
+
+}  // namespace colony::server::api

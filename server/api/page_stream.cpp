@@ -1,0 +1,169 @@
+#include "server/api/page_stream.hpp"
+
+#include <array>
+#include <utility>
+
+#include "server/api/codec_event.hpp"
+
+namespace colony::server::api {
+namespace {
+
+constexpr std::size_t kPieceBytesMax = 64 * 1024;
+constexpr std::size_t kJobsPerRead = 20;
+constexpr std::array kLive = {JobState::kRunning, JobState::kQueued, JobState::kPaused};
+
+void append_message(std::string& out, std::string_view event, const Json& data) {
+  ((((out += "event: ") += event) += "\ndata: ") += to_text(data)) += "\n\n";
+}
+
+}  // namespace
+
+PageStream::PageStream(JobService& jobs, std::string base_path, PageWish wish, Clock clock)
+    : jobs_(jobs), base_path_(std::move(base_path)), wish_(std::move(wish)), clock_(std::move(clock)) {}
+
+void PageStream::on_ready(std::function<void()> wake) {
+  subscription_ = jobs_.follow(std::nullopt, [this, wake = std::move(wake)](const JobNews& news) { hear(news, wake); });
+}
+
+void PageStream::hear(const JobNews& news, const std::function<void()>& wake) {
+  if (!wish_.is_all && !wish_.jobs.contains(news.job_key)) return;
+  {
+    const std::lock_guard lock(news_.mutex);
+    switch (news.kind) {
+      case JobNews::Kind::kCommit:
+        // While progress waits for its turn, more of it wakes nobody: the stream comes back by itself.
+        if (!news_.in_turn.insert(news.job_key).second) return;
+        news_.progressed.push_back(news.job_key);
+        if (news_.progressed.size() > 1) return;
+        break;
+      case JobNews::Kind::kChange:
+        if (!news_.changed.insert(news.job_key).second) return;
+        break;
+      case JobNews::Kind::kRemoved:
+        news_.removed.push_back(news.id);
+        break;
+    }
+    if (news_.changed.size() + news_.removed.size() > kNewsMax) news_.is_too_much = true;
+  }
+  wake();
+}
+
+void PageStream::tell(std::string& out, const JobView& view) {
+  const JobRow& job = view.job;
+  append_message(out, "job", encode_job(view, base_path_));
+  if (!is_ready_) ++told_count_;
+  if (wish_.is_all && is_terminal(job.state)) {
+    told_.erase(job.job_key);  // it can only be renamed or go; both are news with all that they need
+  } else {
+    told_[job.job_key] = {job.id, job.revision, job.state};
+  }
+}
+
+bool PageStream::look(std::string& out, std::int64_t job_key) {
+  const auto view = jobs_.show(job_key);
+  if (!view) return view.error().code == ErrorCode::kNotFound;  // gone: that is news of its own
+  const auto told = told_.find(job_key);
+  const bool is_known =
+      told != told_.end() && told->second.revision == view->job.revision && told->second.state == view->job.state;
+  if (!is_known) tell(out, *view);
+  return true;
+}
+
+bool PageStream::begin(std::string& out) {
+  if (!wish_.is_all) {
+    for (const auto& [key, id] : wish_.jobs) {
+      const auto view = jobs_.show(key);
+      if (!view && view.error().code != ErrorCode::kNotFound) return false;
+      if (view) {
+        tell(out, *view);
+      } else {
+        append_message(out, "deleted", {{"id", id}});
+      }
+    }
+    for (const std::string& id : wish_.missing) append_message(out, "deleted", {{"id", id}});
+    state_index_ = kLive.size();
+  }
+  // A job that changes its state between two of these pages can be missed by both, but then it is news.
+  while (state_index_ < kLive.size() && out.size() < kPieceBytesMax) {
+    JobFilter filter;
+    filter.state = kLive[state_index_];
+    const auto page = jobs_.list(filter, kJobsPerRead, cursor_);
+    if (!page) return false;
+    for (const JobView& view : page->items) tell(out, view);
+    cursor_ = page->next.value_or("");
+    if (!page->next) ++state_index_;
+  }
+  if (state_index_ == kLive.size()) {
+    is_ready_ = true;
+    append_message(out, "ready", {{"jobs", told_count_}});
+  }
+  return true;
+}
+
+bool PageStream::tell_changes(std::string& out) {
+  if (changed_.empty() && removed_.empty()) {
+    const std::lock_guard lock(news_.mutex);
+    changed_.assign(news_.changed.begin(), news_.changed.end());
+    news_.changed.clear();
+    removed_ = std::exchange(news_.removed, {});
+  }
+  for (; !changed_.empty() && out.size() < kPieceBytesMax; changed_.pop_front()) {
+    if (!look(out, changed_.front())) return false;
+  }
+  if (!changed_.empty()) return true;
+  for (const std::string& id : removed_) {
+    append_message(out, "deleted", {{"id", id}});
+    std::erase_if(told_, [&](const auto& told) { return told.second.id == id; });
+  }
+  removed_.clear();
+  return true;
+}
+
+void PageStream::tell_progress(std::string& out) {
+  wake_after_.reset();
+  const auto now = clock_();
+  std::vector<std::int64_t> due;
+  {
+    const std::lock_guard lock(news_.mutex);
+    if (news_.progressed.empty()) return;
+    if (next_tick_ && now < *next_tick_) {
+      wake_after_ = std::chrono::ceil<std::chrono::milliseconds>(*next_tick_ - now);
+      return;
+    }
+    while (!news_.progressed.empty() && due.size() < kProgressPerTickMax) {
+      due.push_back(news_.progressed.front());
+      news_.in_turn.erase(due.back());
+      news_.progressed.pop_front();
+    }
+    if (!news_.progressed.empty()) wake_after_ = kPageTick;
+  }
+  next_tick_ = now + kPageTick;
+  for (const std::int64_t key : due) {
+    const auto told = told_.find(key);
+    const auto progress = jobs_.live_progress(key);
+    // No runner any more, or not told of yet: the job itself is news then.
+    if (told == told_.end() || !progress) continue;
+    Json data = {{"id", told->second.id}, {"state", name_of(told->second.state)}, {"last_seq", progress->last_seq}};
+    data.update(encode_progress(*progress));
+    append_message(out, "progress", data);
+  }
+}
+
+http::BodySource::Pull PageStream::pull(std::string& out) {
+  wake_after_.reset();
+  if (std::exchange(is_first_, false)) out += "retry: 2000\n\n";
+  {
+    const std::lock_guard lock(news_.mutex);
+    if (news_.is_too_much) {
+      out += "event: lagged\ndata: {}\n\n";
+      return Pull::kEnd;
+    }
+  }
+  if (!is_ready_) return begin(out) ? Pull::kMore : Pull::kEnd;
+  if (!tell_changes(out)) return Pull::kEnd;
+  if (!changed_.empty()) return Pull::kMore;
+  tell_progress(out);
+  return Pull::kWait;
+}
+
+}  // namespace colony::server::api

@@ -1,0 +1,78 @@
+#include "server/log.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include "server/http/tokens.hpp"
+
+namespace colony::server {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// Bytes that are not UTF-8 (only ever an echo of bad input) become U+FFFD.
+LogLine json_line(std::string_view level, const Json& line) {
+  return {std::string(level), line.dump(-1, ' ', false, Json::error_handler_t::replace)};
+}
+
+// A line of text stays one line, and a terminal is not told anything by a stranger.
+std::string plain(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte >= 0x20 && byte != 0x7f) {
+      out += c;
+    } else {
+      out += {'\\', 'x', "0123456789abcdef"[byte >> 4], "0123456789abcdef"[byte & 15]};
+    }
+  }
+  return out;
+}
+
+std::string safe(std::string_view text) { return http::without_tokens(text); }
+
+}  // namespace
+
+LogLine log_event(LogFormat format, std::string_view time, std::string_view level, std::string_view message) {
+  if (format == LogFormat::kText) return {std::string(level), plain(safe(message))};
+  return json_line(level, {{"time", time}, {"level", level}, {"event", "message"}, {"message", safe(message)}});
+}
+
+LogLine log_access(LogFormat format, std::string_view time, const http::AccessRecord& record) {
+  const std::string path = safe(record.path);
+  if (format == LogFormat::kText) {
+    std::string text = record.method + " " + path + " " + std::to_string(record.status) + " " +
+                       std::to_string(record.duration_us) + " us " + std::to_string(record.body_bytes) + " B " +
+                       (record.actor.empty() ? "-" : record.actor) + " " + record.remote + " [" + record.request_id + "]";
+    return {"info", plain(text)};
+  }
+  const auto text_or_null = [](const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); };
+  return json_line("info", {{"time", time},
+                            {"level", "info"},
+                            {"event", "request"},
+                            {"request_id", record.request_id},
+                            {"remote", record.remote},
+                            {"method", safe(record.method)},
+                            {"path", path},
+                            {"status", record.status},
+                            {"duration_us", record.duration_us},
+                            {"bytes", record.body_bytes},
+                            {"actor", text_or_null(record.actor)},
+                            {"token_id", text_or_null(record.token_id)}});
+}
+
+LogLine log_failure(LogFormat format, std::string_view time, const http::Request& request, std::string_view what) {
+  const std::string path = safe(request.path);
+  if (format == LogFormat::kText) {
+    return {"error", plain(request.method + " " + path + " [" + request.request_id + "]: " + safe(what))};
+  }
+  return json_line("error", {{"time", time},
+                             {"level", "error"},
+                             {"event", "failure"},
+                             {"request_id", request.request_id},
+                             {"method", request.method},
+                             {"path", path},
+                             {"message", safe(what)},
+                             {"actor", request.principal.name}});
+}
+
+}  // namespace colony::server

@@ -1,0 +1,123 @@
+// Tokens over the interface, and what each operation needs.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/api/handlers_tokens.hpp"
+#include "tests/unit/api_support.hpp"
+
+namespace colony::server::testing {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+TEST(Tokens, ASecretIsShownOnceAndWorksUntilItIsRevoked) {
+  ApiFixture api;
+  api.principal = {"ann", http::Scope::kAdmin, "t"};
+  http::Response made = api.post("/v1/tokens", R"({"name": "bob", "scope": "submit", "expires_h": 1.5})");
+  ASSERT_EQ(made.status, 201) << made.body;
+  const api::Json token = json_of(made);
+  const std::string secret = token["token"];
+  const std::string id = token["id"];
+  EXPECT_EQ(header(made, "Location"), "/v1/tokens/" + id);
+  EXPECT_EQ(token["created_by"], "ann");
+  const auto found = api.tokens.find(secret, http::unix_time_ms());
+  EXPECT_EQ(found.verdict, http::TokenTable::Verdict::kValid);
+  EXPECT_EQ(found.principal.name, "bob");
+  EXPECT_EQ(found.principal.scope, http::Scope::kSubmit);
+  EXPECT_EQ(api.tokens.find(secret, http::unix_time_ms() + 5'400'000).verdict, http::TokenTable::Verdict::kExpired);
+
+  http::Response list = api.get("/v1/tokens");
+  EXPECT_THAT(list.body, Not(HasSubstr("colony_")));
+  EXPECT_EQ(json_of(list)["items"][0]["id"], id);
+
+  // As a server that starts.
+  http::TokenTable fresh;
+  ASSERT_TRUE(api::load_tokens(api.jobs.store().tokens(), fresh));
+  EXPECT_EQ(fresh.find(secret, http::unix_time_ms()).principal.token_id, id);
+
+  EXPECT_EQ(api.ask("DELETE", "/v1/tokens/" + id).status, 204);
+  EXPECT_EQ(api.tokens.find(secret, http::unix_time_ms()).verdict, http::TokenTable::Verdict::kUnknown);
+  EXPECT_EQ(api.ask("DELETE", "/v1/tokens/" + id).status, 404);
+}
+
+TEST(Tokens, EveryFaultIsNamedAndNothingIsMade) {
+  ApiFixture api;
+  const auto wrong = [&](const std::string& body) {
+    http::Response response = api.post("/v1/tokens", body);
+    EXPECT_EQ(response.status, 422) << body;
+    return faults(response);
+  };
+  EXPECT_THAT(wrong("{}"), ElementsAre("/name", "/scope", "/expires_h"));
+  EXPECT_THAT(wrong("[]"), ElementsAre(""));
+  EXPECT_THAT(wrong(R"({"name": 1, "scope": 2, "expires_h": "3", "colour": 4})"),
+              ElementsAre("/name", "/scope", "/expires_h", "/colour"));
+  EXPECT_THAT(wrong(R"({"name": "", "scope": "root", "expires_h": 0})"), ElementsAre("/name", "/scope", "/expires_h"));
+  for (const char* name : {"local", "anonymous", "service", "-x", "a b", "a\\nb", "\u00e9", "a\\\"b"}) {
+    EXPECT_THAT(wrong(R"({"scope": "read", "expires_h": 1, "name": ")" + std::string(name) + "\"}"), ElementsAre("/name"))
+        << name;
+  }
+  for (const char* hours : {"-1", "87600.1", "1e300"}) {
+    EXPECT_THAT(wrong(R"({"scope": "read", "name": "x", "expires_h": )" + std::string(hours) + "}"),
+                ElementsAre("/expires_h"));
+  }
+  EXPECT_EQ(api.post("/v1/tokens", "{").status, 400);
+  http::Response list = api.get("/v1/tokens");
+  EXPECT_TRUE(json_of(list)["items"].empty());
+}
+
+TEST(Tokens, WhoAsksIsWrittenDown) {
+  ApiFixture api;
+  api.principal = {"ann", http::Scope::kSubmit, "t"};
+  EXPECT_EQ(api.post("/v1/jobs", R"({"until": {"cells": 5}})").status, 201);
+  EXPECT_EQ(api.jobs.submitted.at(0).submitted_by, "ann");
+  for (const char* command : {"/cancel", "/pause", "/resume"}) {
+    api.jobs.last_actor.clear();
+    EXPECT_EQ(api.post(kJob + command, "").status, 202);
+    EXPECT_EQ(api.jobs.last_actor, "ann") << command;
+  }
+}
+
+// The table of scopes, as a reader of DESIGN.md has it: read for GET, submit for the rest, and these.
+TEST(Tokens, WhatEachOperationNeeds) {
+  std::vector<std::string> open, admin;
+  for (const api::Endpoint& endpoint : api::endpoints()) {
+    const std::string name = std::string(endpoint.method) + " " + std::string(endpoint.path);
+    switch (api::access_of(endpoint)) {
+      case http::Access::kOpen:
+        open.push_back(name);
+        break;
+      case http::Access::kAdmin:
+        admin.push_back(name);
+        break;
+      case http::Access::kRead:
+        EXPECT_EQ(endpoint.method, "GET") << name;
+        break;
+      case http::Access::kSubmit:
+        EXPECT_NE(endpoint.method, "GET") << name;
+        break;
+    }
+    // Whatever holds data of somebody stands under /v1 and needs a token.
+    const bool is_data = endpoint.path.starts_with("/v1/");
+    EXPECT_FALSE(is_data && api::access_of(endpoint) == http::Access::kOpen) << name;
+  }
+  EXPECT_THAT(open, ::testing::IsSupersetOf({"GET /openapi.json", "GET /healthz", "GET /readyz"}));
+  EXPECT_THAT(admin, ::testing::IsSupersetOf({"POST /v1/tokens", "GET /v1/tokens", "DELETE /v1/tokens/{token_id}"}));
+}
+
+TEST(Tokens, TheDescriptionSaysWhatIsNeeded) {
+  ApiFixture api;
+  http::Response response = api.get("/openapi.json");
+  const api::Json document = json_of(response);
+  const auto needed = [&](const char* path, const char* method) { return document["paths"][path][method]["security"].dump(); };
+  EXPECT_EQ(needed("/v1/jobs", "get"), R"([{"token":["read"]}])");
+  EXPECT_EQ(needed("/v1/jobs", "post"), R"([{"token":["submit"]}])");
+  EXPECT_EQ(needed("/v1/tokens", "get"), R"([{"token":["admin"]}])");
+  EXPECT_EQ(needed("/healthz", "get"), "[]");
+  EXPECT_EQ(document["components"]["securitySchemes"]["token"]["scheme"], "bearer");
+  EXPECT_TRUE(document["paths"]["/v1/jobs"]["get"]["responses"].contains("401"));
+}
+
+}  // namespace
+}  // namespace colony::server::testing
