@@ -4,6 +4,7 @@
 
 #include "engine/analysis/contour.hpp"
 #include "engine/analysis/controls.hpp"
+#include "engine/analysis/reason.hpp"
 #include "engine/base/check.hpp"
 #include "engine/base/maths.hpp"
 
@@ -11,9 +12,9 @@ namespace colony {
 namespace {
 
 MeasuredLine measure(const Result<BinaryImage>& line, const BoxOptions& boxes, StopFlag stop) {
-  if (!line) return {{}, line.error().message};
+  if (!line) return {{}, reason_of(line.error())};
   Result<BoxDimensions> dimensions = box_dimensions(*line, boxes, stop);
-  if (!dimensions) return {{}, dimensions.error().message};
+  if (!dimensions) return {{}, reason_of(dimensions.error())};
   return {std::move(*dimensions), {}};
 }
 
@@ -76,16 +77,16 @@ Result<LabelReport> analyse_labels(const LabelInput& input, StopFlag stop) {
   const LabelImage& labels = *input.labels;
   LabelReport report;
   report.um_per_px = labels.um_per_px;
-  Result<std::vector<Shape>> shapes = cell_shapes(labels);
+  Result<std::vector<Shape>> shapes = cell_shapes(labels, stop);
   if (!shapes) return shapes.error();
   report.shapes = std::move(*shapes);
-  Result<Contacts> contacts = find_contacts(labels, input.gap_px);
+  Result<Contacts> contacts = find_contacts(labels, input.gap_px, stop);
   if (!contacts) return contacts.error();
   report.contacts = std::move(*contacts);
-  const Result<ColonyShape> colony = colony_shape(labels, input.gap_px);
+  const Result<ColonyShape> colony = colony_shape(labels, input.gap_px, stop);
   if (!colony) return colony.error();
   report.colony = *colony;
-  Result<std::vector<Ring>> rings = radial_profile(labels, report.shapes, input.active, input.ring_count);
+  Result<std::vector<Ring>> rings = radial_profile(labels, report.shapes, input.active, input.ring_count, stop);
   if (!rings) return rings.error();
   report.rings = std::move(*rings);
   report.sides = side_statistics(report.contacts);
@@ -94,6 +95,9 @@ Result<LabelReport> analyse_labels(const LabelInput& input, StopFlag stop) {
   report.cell_count = report.shapes.size();
   report.cell_area_mean_px = static_cast<double>(report.colony.covered_px) / static_cast<double>(report.cell_count);
   report.px_per_cell_diameter = 2.0 * std::sqrt(report.cell_area_mean_px / maths::kPi);
+  Result<ClosedSides> closed = closed_sides(labels, report.cell_area_mean_px, input.gap_px, stop);
+  if (!closed) return closed.error();
+  report.closed_sides = std::move(*closed);
 
   report.lines = analyse_lines(labels, input.gap_px, input.boxes, stop);
   if (input.without_noise != nullptr) {
@@ -104,7 +108,7 @@ Result<LabelReport> analyse_labels(const LabelInput& input, StopFlag stop) {
     if (control) {
       report.controls.push_back({name, analyse_lines(*control, 0, input.boxes, stop)});
     } else {
-      report.controls.push_back({name, {{{}, control.error().message}, {{}, control.error().message}}});
+      report.controls.push_back({name, {{{}, reason_of(control.error())}, {{}, reason_of(control.error())}}});
     }
   };
   add_control("hexagonal", hexagonal_control(areas, labels.um_per_px));
@@ -118,6 +122,7 @@ Result<LabelReport> analyse_labels(const LabelInput& input, StopFlag stop) {
   for (const ControlReport& control : report.controls) {
     judge_control("colony outline", report.lines.outline, control.lines.outline, control.name, report.verdict);
   }
+  for (std::string& sentence : judge_sides(report.sides, report.closed_sides)) report.verdict.push_back(std::move(sentence));
   return report;
 }
 
@@ -156,7 +161,7 @@ Result<ThresholdSweep> threshold_sweep(const GreyImage& image, const std::vector
     }
     row.foreground_share = static_cast<double>(count) / static_cast<double>(mask.values.size());
     if (count == mask.values.size()) {
-      row.set.reason = row.boundary.reason = "image: is nothing but foreground: there is no structure to measure";
+      row.set.reason = row.boundary.reason = "the image is nothing but foreground: there is no structure to measure";
     } else {
       row.set = measure(mask, options, stop);
       row.boundary = measure(boundary_of(mask), options, stop);
