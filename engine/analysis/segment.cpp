@@ -172,6 +172,8 @@ Objects objects_at(const GreyImage& signal, int threshold, Pipeline pipeline, co
 class Steps {
  public:
   Steps(const SegmentOptions& options, std::vector<StepImage>& steps) : options_(options), steps_(steps) {}
+  /// The one step that was asked for is there: nothing else is.
+  bool is_complete() const { return !options_.keep_only.empty() && !steps_.empty(); }
   bool wants(const std::string& name) const {
     return options_.keep_steps && (options_.keep_only.empty() || options_.keep_only == name);
   }
@@ -203,7 +205,7 @@ GreyImage evened(const GreyImage& image, const SegmentOptions& options, Steps& s
   return even;
 }
 
-/// What is thresholded: light where there is something.
+/// What is thresholded: light where there is something. Where the steps are complete before, any image.
 GreyImage signal_of(const GreyImage& image, const SegmentOptions& options, Segmentation& result, Steps& steps) {
   if (result.pipeline == Pipeline::kPhase) {
     GreyImage signal = local_deviation(evened(image, options, steps), options.window_radius_px);
@@ -213,6 +215,7 @@ GreyImage signal_of(const GreyImage& image, const SegmentOptions& options, Segme
   const bool dark = result.foreground == Foreground::kDark;
   const GreyImage light = dark ? inverted(image) : image;
   if (dark) steps.add("inverted", "turned so that the foreground is light", light);
+  if (steps.is_complete()) return light;
   result.background_reach_px = options.background_reach_px.value_or(
       std::max(std::min(image.width_px, image.height_px) / 4, kBackgroundReachMin_px));
   const GreyImage ground = background(light, result.background_reach_px);
@@ -220,8 +223,10 @@ GreyImage signal_of(const GreyImage& image, const SegmentOptions& options, Segme
             "what the picture would be without its objects: opening with a square of " +
                 std::to_string(result.background_reach_px) + " px, smoothed",
             ground);
+  if (steps.is_complete()) return light;
   const GreyImage corrected = subtracted(light, ground);
   steps.add("corrected", "the picture less its background", corrected);
+  if (steps.is_complete()) return light;
   GreyImage signal = square_root(smoothed(evened(corrected, options, steps)));
   steps.add("signal", "smoothed 3 x 3, square root: what is thresholded", signal);
   return signal;
@@ -261,6 +266,7 @@ Result<Segmentation> segment(const GreyImage& image, const SegmentOptions& optio
   result.foreground = options.foreground;
   Steps steps(options, result.steps);
   steps.add("grey", "the channel that is analysed, as 8 bits", image);
+  if (steps.is_complete()) return result;
   result.field_px = static_cast<std::int64_t>(image.values.size());
   result.threshold_given = options.threshold.has_value();
 
@@ -272,6 +278,7 @@ Result<Segmentation> segment(const GreyImage& image, const SegmentOptions& optio
       result.foreground = 2 * light_px <= result.field_px ? Foreground::kLight : Foreground::kDark;
     result.mask = result.foreground == Foreground::kLight ? std::move(light) : inverted(light);
     steps.add("threshold", "the ink: what is measured, as it is", result.mask);
+    if (steps.is_complete()) return result;
     const Pieces found = pieces_of(result.mask);
     result.area_min_px = 1;
     result.labels = renumbered(found.labels, 1, &result.areas_px);
@@ -282,8 +289,9 @@ Result<Segmentation> segment(const GreyImage& image, const SegmentOptions& optio
       result.foreground = look.light - look.middle >= look.middle - look.dark ? Foreground::kLight : Foreground::kDark;
     }
     const GreyImage signal = signal_of(image, options, result, steps);
+    if (steps.is_complete()) return result;
     // Where a window is constant the picture was clipped or empty: such pixels say nothing about where noise ends and cells begin.
-    const int level = options.threshold.value_or(otsu(signal, result.pipeline == Pipeline::kPhase ? 37 : 0));
+    const int level = options.threshold.value_or(otsu(signal, result.pipeline == Pipeline::kPhase ? kOneLevelOfDeviation : 0));
     if (level < 0) return wrong("image", "after the background is taken away nothing is left in it");
     result.threshold = level;
     throw_if_stopped(stop);
@@ -301,11 +309,12 @@ Result<Segmentation> segment(const GreyImage& image, const SegmentOptions& optio
       steps.add("distance", "distance to the background, by which touching objects are parted",
                 shown(objects.distance));
     }
+    if (steps.is_complete()) return result;
     result.area_min_px = objects.area_min_px;
     result.mask = std::move(objects.mask);
     result.labels = std::move(objects.labels);
     result.areas_px = std::move(objects.areas_px);
-    for (std::int64_t k = -kSweepSide; k <= kSweepSide; ++k) {
+    for (std::int64_t k = -kSweepSide; k <= kSweepSide && options.keep_only.empty(); ++k) {
       const std::int64_t at = level + k * kSweepStep;
       if (at < 0 || at > 254) continue;
       throw_if_stopped(stop);
@@ -317,12 +326,14 @@ Result<Segmentation> segment(const GreyImage& image, const SegmentOptions& optio
     }
   }
   for (const std::int64_t area : result.areas_px) result.foreground_px += area;
+  // A threshold that nobody gave is not what is wrong.
+  const std::string field = result.threshold_given ? "threshold" : "image";
   if (result.foreground_px == 0) {
-    return wrong("threshold", "nothing is left in the foreground at level " + std::to_string(result.threshold) +
+    return wrong(field, "nothing is left in the foreground at level " + std::to_string(result.threshold) +
                                   ": give another threshold, foreground or pipeline");
   }
   if (result.foreground_px == result.field_px) {
-    return wrong("threshold", "everything is foreground at level " + std::to_string(result.threshold) +
+    return wrong(field, "everything is foreground at level " + std::to_string(result.threshold) +
                                   ": give another threshold, foreground or pipeline");
   }
   if (steps.wants("overlay")) steps.add(overlay(image, result.labels));
