@@ -4,6 +4,7 @@
 
 #include "engine/analysis/contour.hpp"
 #include "engine/analysis/controls.hpp"
+#include "engine/analysis/reason.hpp"
 #include "engine/base/check.hpp"
 #include "server/api/codec_report.hpp"
 
@@ -36,7 +37,7 @@ AnalysisOptions engine_options(const ImageOptions& options) {
 
 MeasuredLine measure(const BinaryImage& line, const BoxOptions& boxes, StopFlag stop) {
   auto dimensions = box_dimensions(line, boxes, stop);
-  if (!dimensions) return {{}, dimensions.error().message};
+  if (!dimensions) return {{}, reason_of(dimensions.error())};
   return {std::move(*dimensions), {}};
 }
 
@@ -45,7 +46,7 @@ void add_control(PictureMeasurement& out, const char* name, const Result<LabelIm
   if (control) {
     out.controls.push_back({name, analyse_lines(*control, 0, boxes, stop)});
   } else {
-    const MeasuredLine none{{}, control.error().message};
+    const MeasuredLine none{{}, reason_of(control.error())};
     out.controls.push_back({name, {none, none}});
   }
 }
@@ -92,7 +93,7 @@ Status measure_objects(PictureMeasurement& out, const BoxOptions& boxes, StopFla
     out.verdict = report->verdict;
     out.report = std::move(*report);
   } else {
-    out.reason = report.error().message;
+    out.reason = reason_of(report.error());
     out.lines = {{{}, out.reason}, {{}, out.reason}};
   }
   if (out.analysis.segmentation.pipeline == Pipeline::kNuclei) {

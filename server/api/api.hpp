@@ -46,8 +46,11 @@ inline constexpr std::size_t kIdempotencyKeyBytesMax = 200;
 /// Up to here a picture is analysed before the answer, beyond by the worker.
 inline constexpr std::int64_t kAnalysedAtOncePixelsMax = 4'000'000;
 inline constexpr std::int64_t kServedPictureSideMax_px = 8192;
-inline constexpr std::uint64_t kMeshTrianglesDefault = 200'000;
+/// triangles_max unless it is given: so many a cell, at least as many, at most kServedMeshTrianglesMax.
+inline constexpr std::int64_t kMeshTrianglesPerCellDefault = 400;
+inline constexpr std::int64_t kMeshTrianglesDefaultMin = 200'000;
 inline constexpr std::int64_t kServedMeshTrianglesMax = 4'000'000;  // 50 bytes each, and the file once more
+std::int64_t mesh_triangles_default(std::size_t cell_count);
 inline constexpr std::uint32_t kPackingPoints = 1024;               // a cell's volume to 1.1 %
 /// Placing more founders than this can take long: one submission at a time may.
 inline constexpr std::uint64_t kFoundersPlacedFreely = 1000;
@@ -136,6 +139,7 @@ http::Response post_analysis(Context& context, const Call& call);
 http::Response get_analyses(Context& context, const Call& call);
 http::Response get_analysis(Context& context, const Call& call);
 http::Response delete_analysis(Context& context, const Call& call);
+http::Response get_analysis_steps(Context& context, const Call& call);
 http::Response get_analysis_step(Context& context, const Call& call);
 http::Response post_comparison(Context& context, const Call& call);
 http::Response get_comparisons(Context& context, const Call& call);

@@ -21,6 +21,8 @@ Result<ComparisonSpec> decode_comparison_spec(const Json& body);
 
 /// The member `result` is left out of lists.
 Json encode_analysis(const AnalysisRow& row, bool with_result);
+/// {items, next}: each step that can be fetched, what it shows and where; none without a result.
+Json encode_steps(const AnalysisRow& row);
 
 /// Schemas by component name.
 Json analysis_components();

@@ -114,6 +114,11 @@ test('a job is seen, measured and compared', async (t) => {
     assert.doesNotMatch(html, /(src|href)\s*=\s*"(?!data:)/i, 'nothing is loaded from anywhere');
     assert.doesNotMatch(html, /<script|@import|url\(/i);
     assert.equal(html.match(/<svg/g).length, html.match(/<\/svg>/g).length);
+    const half = job.progress.time_h / 2;
+    assert.equal((await colony(server, ['report', job.id, '--at-h', String(half), '-o', page])).code, 0);
+    const then = (await server.get(`${base}/analysis?at_h=${half}`)).json;
+    assert.ok(then.cell_count < 24);
+    assert.match(readFileSync(page, 'utf8'), new RegExp(`<th>digest</th><td><code>${then.digest}`), 'the page says of which moment it is');
     const picture = join(folder, 'discs.png');
     writeFileSync(picture, discs(6, 9));
     const analyzed = await colony(server, ['analyze', picture, '--pipeline', 'nuclei', '--steps', join(folder, 'steps')]);
@@ -123,7 +128,14 @@ test('a job is seen, measured and compared', async (t) => {
     const compared = await colony(server, ['compare', job.id, id, '--figure', join(folder, 'figure.png')]);
     assert.equal(compared.code, 0, compared.err);
     assert.ok(pngFacts(readFileSync(join(folder, 'figure.png'))).height > 1000);
-    assert.equal((await colony(server, ['measure', job.id])).code, 0);
+    const measured = await colony(server, ['measure', job.id, '--um-per-px', '0.2']);
+    assert.equal(measured.code, 0, measured.err);
+    assert.match(measured.out, /interior cells/, 'sides, held against Gibson\'s table');
+    assert.match((await colony(server, ['analysis', id.slice(-8)])).out, /objects: 36/);
+    assert.equal((await colony(server, ['delete-analysis', id.slice(-8)])).code, 0);
+    const orphan = (await server.get('/v1/comparisons')).json.items[0];
+    assert.equal(orphan.links.figure, null);
+    assert.equal((await colony(server, ['delete-comparison', orphan.id])).code, 0);
     assert.match((await colony(server, ['lineage', job.id])).out, /;\n$/);
     assert.equal((await colony(server, ['mesh', job.id, '-o', join(folder, 'm.glb')])).code, 0);
     const text = join(folder, 'text.png');
