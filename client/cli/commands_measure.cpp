@@ -20,7 +20,7 @@ constexpr std::chrono::milliseconds kPollInterval{500};
 
 struct FileOptions {
   std::string id, output;
-  std::optional<std::string> at_h, triangles_max;
+  std::optional<std::string> at_h, triangles_max, um_per_px, width_px;
   bool no_nuclei = false, cells = false;
 };
 
@@ -87,7 +87,7 @@ void print_sweep(std::ostream& out, const Json& measured) {
 
 ExitCode measure(Session& session, const FileOptions& options) {
   Target target = job_target(resolve_job_id(session, options.id), "/analysis");
-  target.add_if("at_h", options.at_h);
+  target.add_if("at_h", options.at_h).add_if("um_per_px", options.um_per_px).add_if("width_px", options.width_px);
   if (options.cells) {
     if (session.json) throw Failure(ExitCode::kUsage, "--json: the cells are a table; without --cells the measurements are JSON");
     return fetch_file(session, target, "text/csv", options.output);
@@ -203,7 +203,9 @@ ExitCode analyze(Session& session, const AnalyzeOptions& options) {
   if (options.clahe) target.add("clahe", "true");
   if (options.no_split) target.add("split", "false");
   request.target = target.text();
-  const Json row = when_done(session, session.client().send(request));
+  HttpResponse answer = session.client().send(request);
+  require_ok(answer, printable(options.file));
+  const Json row = when_done(session, std::move(answer));
   if (!options.steps.empty()) save_steps(session, row, options.steps);
   if (!options.objects.empty()) {
     fetch_file(session, Target(row.at("links").at("objects").get<std::string>()), "text/csv", options.objects);
@@ -238,7 +240,7 @@ struct CompareOptions {
 };
 
 ExitCode compare(Session& session, const CompareOptions& options) {
-  Json body = {{"job_id", resolve_job_id(session, options.id)}, {"analysis_id", options.analysis_id}};
+  Json body = {{"job_id", resolve_job_id(session, options.id)}, {"analysis_id", resolve_id(session, options.analysis_id, kAnalyses)}};
   if (options.at_h) body["at_h"] = number_option("--at-h", *options.at_h);
   if (options.name) body["name"] = *options.name;
   if (options.match) body["match"] = *options.match;
@@ -290,13 +292,15 @@ void add_measure_commands(CLI::App& app, Session& session, Action& action) {
 
   auto mesh = std::make_shared<FileOptions>();
   command = add_file_command(app, "mesh", "The surfaces of cells and nuclei, as binary glTF (GLB)", *mesh, true);
-  command->add_option("--triangles-max", mesh->triangles_max, "Most triangles");
+  command->add_option("--triangles-max", mesh->triangles_max, "Most triangles (default: 400 for each cell, within 200,000 to 4,000,000)");
   command->add_flag("--no-nuclei", mesh->no_nuclei, "Without nuclei");
   command->callback([&session, &action, mesh] { action = [&session, mesh] { return fetch_mesh(session, *mesh); }; });
 
   auto measured = std::make_shared<FileOptions>();
   command = add_file_command(app, "measure", "Measurements of a colony, with controls, and what follows from them", *measured, true);
   command->add_flag("--cells", measured->cells, "The shape of each cell instead, as CSV");
+  command->add_option("--um-per-px", measured->um_per_px, "Scale of the measured picture (instead of its width)");
+  command->add_option("--width-px", measured->width_px, "Width of the measured picture");
   command->callback([&session, &action, measured] { action = [&session, measured] { return measure(session, *measured); }; });
 
   auto picture = std::make_shared<AnalyzeOptions>();
@@ -322,7 +326,7 @@ void add_measure_commands(CLI::App& app, Session& session, Action& action) {
   auto both = std::make_shared<CompareOptions>();
   command = app.add_subcommand("compare", "A colony against an analysed picture");
   command->add_option("ID", both->id, "Job id, or its unique end")->required();
-  command->add_option("ANALYSIS", both->analysis_id, "Id of the analysis, as `analyze` prints it")->required();
+  command->add_option("ANALYSIS", both->analysis_id, "Analysis id, or its unique end (`colony analyses` shows them)")->required();
   command->add_option("--at-h", both->at_h, "Model time, h (default: now, or the end)");
   command->add_option("--name", both->name, "A name for people");
   command->add_option("--match", both->match, "object_area or um_per_px (default: object_area)");

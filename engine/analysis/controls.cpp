@@ -265,7 +265,7 @@ Result<LabelImage> random_disc_control(const std::vector<LabelArea>& areas, cons
 }
 
 Result<LabelImage> noise_free_control(const Colony& colony, std::int64_t width_px, std::int64_t height_px,
-                                      double um_per_px, double left_um, double top_um) {
+                                      double um_per_px, double left_um, double top_um, StopFlag stop) {
   const auto pixels = width_px > 0 && height_px > 0 && width_px <= kImageSideMax_px && height_px <= kImageSideMax_px
                           ? static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px)
                           : std::size_t{0};
@@ -286,6 +286,7 @@ Result<LabelImage> noise_free_control(const Colony& colony, std::int64_t width_p
     return static_cast<std::int64_t>(std::clamp(um / um_per_px + 2.0, 0.0, static_cast<double>(count)));
   };
   for (const Cell& cell : colony.cells()) {
+    throw_if_stopped(stop);
     const Body& body = colony.body(cell.id);
     const Vec2 half = body.footprint_half_extent_um();
     const double x = body.centre_um().x() - left_um, y = top_um - body.centre_um().y();

@@ -4,15 +4,16 @@
 
 #include "engine/analysis/contour.hpp"
 #include "engine/analysis/controls.hpp"
+#include "engine/analysis/reason.hpp"
 #include "engine/base/check.hpp"
 #include "engine/base/maths.hpp"
 
 namespace colony {
 
 MeasuredLine measure_line(const Result<BinaryImage>& line, const BoxOptions& boxes, StopFlag stop) {
-  if (!line) return {{}, line.error().message};
+  if (!line) return {{}, reason_of(line.error())};
   Result<BoxDimensions> dimensions = box_dimensions(*line, boxes, stop);
-  if (!dimensions) return {{}, dimensions.error().message};
+  if (!dimensions) return {{}, reason_of(dimensions.error())};
   return {std::move(*dimensions), {}};
 }
 
@@ -98,7 +99,7 @@ MatchedControls matched_controls(const LabelImage& labels, const LineReport& lin
   if (hull.area_px > 0) out.cover = static_cast<double>(covered) / static_cast<double>(hull.area_px);
   const bool is_tiled = out.cover >= kTilingCover;
   const auto add = [&](const char* name, const Result<LabelImage>& control) {
-    const MeasuredLine none{{}, control ? std::string() : control.error().message};
+    const MeasuredLine none{{}, control ? std::string() : reason_of(control.error())};
     out.reports.push_back({name, control ? analyse_lines_like(lines, *control, boxes, stop) : LineReport{none, none},
                            is_tiled ? Placement::kTouching : Placement::kSpread});
   };
@@ -125,16 +126,16 @@ Result<LabelReport> analyse_labels(const LabelInput& input, StopFlag stop) {
   const LabelImage& labels = *input.labels;
   LabelReport report;
   report.um_per_px = labels.um_per_px;
-  Result<std::vector<Shape>> shapes = cell_shapes(labels);
+  Result<std::vector<Shape>> shapes = cell_shapes(labels, stop);
   if (!shapes) return shapes.error();
   report.shapes = std::move(*shapes);
-  Result<Contacts> contacts = find_contacts(labels, input.gap_px);
+  Result<Contacts> contacts = find_contacts(labels, input.gap_px, stop);
   if (!contacts) return contacts.error();
   report.contacts = std::move(*contacts);
-  const Result<ColonyShape> colony = colony_shape(labels, input.gap_px);
+  const Result<ColonyShape> colony = colony_shape(labels, input.gap_px, stop);
   if (!colony) return colony.error();
   report.colony = *colony;
-  Result<std::vector<Ring>> rings = radial_profile(labels, report.shapes, input.active, input.ring_count);
+  Result<std::vector<Ring>> rings = radial_profile(labels, report.shapes, input.active, input.ring_count, stop);
   if (!rings) return rings.error();
   report.rings = std::move(*rings);
   report.sides = side_statistics(report.contacts);
@@ -143,6 +144,9 @@ Result<LabelReport> analyse_labels(const LabelInput& input, StopFlag stop) {
   report.cell_count = report.shapes.size();
   report.cell_area_mean_px = static_cast<double>(report.colony.covered_px) / static_cast<double>(report.cell_count);
   report.px_per_cell_diameter = 2.0 * std::sqrt(report.cell_area_mean_px / maths::kPi);
+  Result<ClosedSides> closed = closed_sides(labels, report.cell_area_mean_px, input.gap_px, stop);
+  if (!closed) return closed.error();
+  report.closed_sides = std::move(*closed);
 
   report.lines = analyse_lines(labels, input.gap_px, input.boxes, stop);
   if (input.without_noise != nullptr) {
@@ -155,6 +159,10 @@ Result<LabelReport> analyse_labels(const LabelInput& input, StopFlag stop) {
 
   report.findings = judge_lines(report.lines, report.controls, input.objects);
   report.verdict = sentences_of(report.findings);
+  // Sides are those of cells: what nuclei or regions touch says nothing of Gibson's table.
+  if (input.objects == ObjectKind::kCells) {
+    for (std::string& sentence : judge_sides(report.sides, report.closed_sides)) report.verdict.push_back(std::move(sentence));
+  }
   for (std::string& sentence : control_sentences(input.objects, matched.cover)) report.verdict.push_back(std::move(sentence));
   return report;
 }

@@ -18,6 +18,7 @@
 #include "engine/analysis/neighbours.hpp"
 #include "engine/analysis/radial.hpp"
 #include "engine/analysis/scaling.hpp"
+#include "engine/analysis/sides.hpp"
 #include "engine/analysis/verdict.hpp"
 #include "engine/random/stream.hpp"
 
@@ -79,7 +80,8 @@ struct LabelReport {
   std::vector<Shape> shapes;              // by label
   ColonyShape colony;
   Contacts contacts;
-  SideStatistics sides;
+  SideStatistics sides;                   // as seen
+  ClosedSides closed_sides;               // small holes given away: what Gibson's table is about
   std::optional<SiblingStraightness> siblings = {};
   std::vector<Ring> rings;
   ApartCells apart;

@@ -4,6 +4,7 @@
 
 #include "engine/analysis/contour.hpp"
 #include "engine/analysis/controls.hpp"
+#include "engine/analysis/reason.hpp"
 #include "engine/base/check.hpp"
 #include "server/api/codec_report.hpp"
 
@@ -87,7 +88,7 @@ Status measure_objects(PictureMeasurement& out, const BoxOptions& boxes, StopFla
     out.object_cover = report->object_cover;
     out.report = std::move(*report);
   } else {
-    out.reason = report.error().message;
+    out.reason = reason_of(report.error());
     out.lines = {{{}, out.reason}, {{}, out.reason}};
   }
   if (out.analysis.segmentation.pipeline == Pipeline::kNuclei) {

@@ -211,12 +211,25 @@ Json encode_analysis(const AnalysisRow& row, bool with_result, std::string_view 
   if (with_result) out["result"] = row.result_json.empty() ? Json(nullptr) : Json::parse(row.result_json);
   out["links"] = {{"self", self}};
   if (is_comparison) {
-    out["links"]["figure"] = self + "/figure";
+    // Made again from what was compared: once that is deleted there is none.
+    out["links"]["figure"] = row.has_source ? Json(self + "/figure") : Json(nullptr);
   } else {
     out["links"]["steps"] = self + "/steps";
     out["links"]["objects"] = self + "/objects";
   }
   return out;
+}
+
+Json encode_steps(const AnalysisRow& row, std::string_view base_path) {
+  const std::string steps = std::string(base_path) + "/v1/analyses/" + row.id + "/steps/";
+  Json items = Json::array();
+  if (!row.result_json.empty()) {
+    const Json result = Json::parse(row.result_json);
+    for (const Json& step : result["steps"]) {
+      items.push_back({{"name", step["name"]}, {"text", step["text"]}, {"href", steps + step["name"].get<std::string>()}});
+    }
+  }
+  return {{"items", std::move(items)}, {"next", nullptr}};
 }
 
 Json analysis_components() {
@@ -246,6 +259,7 @@ Json analysis_components() {
                           {"analysis_id", typed("string")},
                           {"at_h", {{"type", Json::array({"number", "null"})}, {"minimum", 0}, {"maximum", kAtMax_h}}},
                           {"name", typed("string")}});
+  comparison["links"]["properties"]["figure"]["type"] = Json::array({"string", "null"});
   Json spec = {{"type", "object"},
                {"properties", std::move(spec_properties)},
                {"required", Json::array({"job_id", "analysis_id"})},
@@ -255,6 +269,10 @@ Json analysis_components() {
   comparison["result"] = or_null(reference("ComparisonResult"));
   components.update({{"Analysis", strict_object(std::move(analysis))},
                      {"AnalysisList", page_of("AnalysisSummary")},
+                     {"StepList", page_of("Step")},
+                     {"Step", strict_object({{"name", typed("string")},
+                                             {"text", typed("string")},
+                                             {"href", {{"type", "string"}, {"format", "uri-reference"}}}})},
                      {"Comparison", strict_object(std::move(comparison))},
                      {"ComparisonList", page_of("ComparisonSummary")},
                      {"ComparisonSpec", std::move(spec)},

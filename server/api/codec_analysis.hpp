@@ -28,6 +28,8 @@ MatchRequest decode_match_request(const std::string& options_json);
 
 /// The member `result` is left out of lists. `base_path`: what the links begin with.
 Json encode_analysis(const AnalysisRow& row, bool with_result, std::string_view base_path);
+/// {items, next}: each step that can be fetched, what it shows and where; none without a result.
+Json encode_steps(const AnalysisRow& row, std::string_view base_path);
 
 /// Schemas by component name.
 Json analysis_components();

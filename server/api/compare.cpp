@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "engine/analysis/controls.hpp"
+#include "engine/analysis/reason.hpp"
 #include "engine/base/maths.hpp"
 #include "engine/picture/top_view.hpp"
 #include "server/api/codec_report.hpp"
@@ -241,7 +242,7 @@ Result<Comparison> compare(ColonyAt at, std::string_view picture, const ImageOpt
   auto image = label_colony(*at.colony, spec, effort);
   if (!image) {
     return Error{image.error().code,
-                 "the colony cannot be drawn at " + decimals(*scale, 4) + " um a pixel, which the match asks for: " + image.error().message,
+                 "the colony cannot be drawn at " + decimals(*scale, 4) + " um a pixel, which the match asks for: " + reason_of(image.error()),
                  {{request.by == MatchBy::kUmPerPx ? "/match" : "/analysis_id",
                    "at this scale the colony's sides exceed " + std::to_string(kMeasuredSideMax_px) + " px, or are none"}}};
   }

@@ -1,4 +1,5 @@
 // Handlers of comparisons: a colony at a time against a picture that was sent.
+#include "engine/analysis/reason.hpp"
 #include "server/api/analysis_work.hpp"
 #include "server/api/api.hpp"
 #include "server/api/codec_analysis.hpp"
@@ -56,7 +57,7 @@ Result<Comparison> compare_again(Context& context, const AnalysisRow& row, const
 AnalysisWorker::Outcome work_on(Context& context, const AnalysisRow& row, StopFlag stop) {
   const Effort effort{context.config.jobs.threads_per_job, stop};
   const auto failed = [](const Error& error) {
-    return AnalysisWorker::Outcome{{}, std::string(problem_row(problem_kind_of(error.code)).code), error.message};
+    return AnalysisWorker::Outcome{{}, std::string(problem_row(problem_kind_of(error.code)).code), reason_of(error)};
   };
   if (row.kind == AnalysisKind::kComparison) {
     const auto comparison = compare_again(context, row, effort, Sweep::kMake);
@@ -118,7 +119,7 @@ http::Response get_comparisons(Context& context, const Call& call) {
 }
 http::Response get_comparison(Context& context, const Call& call) {
   const auto row = context.jobs.store().analyses().find(AnalysisKind::kComparison, call.id());
-  return row ? json_response(200, encode_analysis(*row, true, context.config.base_path)) : failure(row.error(), call);
+  return row ? json_response(200, encode_analysis(with_job(context, *row), true, context.config.base_path)) : failure(row.error(), call);
 }
 http::Response delete_comparison(Context& context, const Call& call) {
   return removed(context, call, AnalysisKind::kComparison);

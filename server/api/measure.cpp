@@ -21,7 +21,7 @@ Result<LabelledColony> label_colony(const Colony& colony, const PictureSpec& spe
   out.top_um = frame->top_um;
   view = {};  // its heights are not needed beside the control
   Result<LabelImage> smooth = noise_free_control(colony, frame->width_px, frame->height_px, frame->um_per_px,
-                                                 frame->left_um, frame->top_um);
+                                                 frame->left_um, frame->top_um, effort.stop);
   if (!smooth) return smooth.error();
   out.without_noise = std::move(*smooth);
   throw_if_stopped(effort.stop);

@@ -15,8 +15,10 @@ namespace colony::server::testing {
 namespace {
 
 using api::Json;
+using ::testing::AnyOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::StartsWith;
 
 TEST(JobPictures, HaveTheirTypes) {
@@ -40,6 +42,21 @@ TEST(JobPictures, HaveTheirTypes) {
   EXPECT_THAT(faults(few), ElementsAre("triangles_max"));
 }
 
+TEST(JobPictures, TakeWhatHasAMeaningForTheStyle) {
+  ApiFixture fixture;
+  for (const char* query : {"style=shaded&colour_by=age&scale_bar=false", "style=contours&lines=colony&scale_bar=true", "style=phase&scale_bar=false"}) {
+    EXPECT_EQ(fixture.get(kJob + "/image?width_px=64&" + query).status, 200) << query;
+  }
+}
+
+TEST(JobPictures, AMeshWithoutAWishHasTrianglesForEveryCell) {
+  EXPECT_EQ(api::mesh_triangles_default(0), 200'000);
+  EXPECT_EQ(api::mesh_triangles_default(500), 200'000);
+  EXPECT_EQ(api::mesh_triangles_default(7303), 2'921'200);
+  EXPECT_GE(api::mesh_triangles_default(20'000), 200 * 20'000);  // at least what each cell needs
+  EXPECT_EQ(api::mesh_triangles_default(1'000'000), 4'000'000);
+}
+
 TEST(JobAnalysis, HasItsControlsBesideIt) {
   ApiFixture fixture;
   auto response = fixture.get(kJob + "/analysis?width_px=512");
@@ -54,6 +71,8 @@ TEST(JobAnalysis, HasItsControlsBesideIt) {
   EXPECT_LT(d0["value"].get<double>(), 2.0);
   EXPECT_EQ(d0["range_px"].size(), 2u);
   EXPECT_FALSE(json["verdict"].empty());
+  for (const Json& sentence : json["verdict"]) EXPECT_THAT(sentence.get<std::string>(), Not(AnyOf(HasSubstr("image: "), HasSubstr("areas: "))));
+  EXPECT_EQ(json["neighbours"]["holes_given"]["classes"].size(), json["neighbours"]["classes"].size());
   EXPECT_TRUE(json["packing"]["reason"].is_null());
   EXPECT_EQ(json["findings"]["walls"]["finding"], "crossover");
   EXPECT_THAT(json["verdict"][0].get<std::string>(), HasSubstr("a crossover, not scaling"));
@@ -160,6 +179,14 @@ TEST(Analyses, CountDrawnDiscsAndKeepThem) {
   EXPECT_EQ(fixture.get(self + "x/objects").status, 404);
   auto absent = fixture.get(self + "/steps/dream");
   EXPECT_EQ(absent.status, 404);
+  EXPECT_THAT(json_of(absent)["detail"].get<std::string>(), HasSubstr("there are grey, "));
+  auto steps = fixture.get(made["links"]["steps"].get<std::string>());
+  ASSERT_EQ(steps.status, 200) << steps.body;
+  const Json items = json_of(steps)["items"];
+  ASSERT_EQ(items.size(), made["result"]["steps"].size());
+  EXPECT_EQ(items[0]["name"], "grey");
+  EXPECT_FALSE(items[0]["text"].get<std::string>().empty());
+  EXPECT_EQ(fixture.get(items[0]["href"].get<std::string>()).status, 200);
   EXPECT_EQ(fixture.ask("DELETE", self).status, 204);
   EXPECT_EQ(fixture.get(self).status, 404);
 }
@@ -192,7 +219,10 @@ TEST(Analyses, TakePicturesOnlyAndSayWhy) {
   for (const Case& one : cases) {
     auto refused = send_picture(fixture, one.bytes);
     EXPECT_EQ(refused.status, one.status) << one.what << refused.body;
-    EXPECT_GT(json_of(refused)["detail"].get<std::string>().size(), 10u) << one.what;
+    const std::string detail = json_of(refused)["detail"];
+    EXPECT_GT(detail.size(), 10u) << one.what;
+    EXPECT_THAT(detail, Not(AnyOf(StartsWith("image:"), StartsWith("threshold:")))) << one.what;
+    EXPECT_THAT(faults(refused), ElementsAre("")) << one.what;  // all of the body
   }
   auto channel = send_picture(fixture, picture, "?channel=3");
   EXPECT_THAT(faults(channel), ElementsAre("channel"));
@@ -207,6 +237,9 @@ TEST(Analyses, BeyondTheLimitAreWorkedOnLater) {
   ASSERT_EQ(response.status, 202) << response.body;
   const std::string self = json_of(response)["links"]["self"];
   EXPECT_EQ(json_of(response)["state"], "queued");
+  auto none = fixture.get(self + "/steps");
+  EXPECT_TRUE(json_of(none)["items"].empty());
+  EXPECT_EQ(fixture.get(self + "/steps/grey").status, 404);  // nothing is computed for a row that waits
   ASSERT_TRUE(fixture.api().start());
   Json row;
   for (;;) {  // the test's own deadline is that of ctest

@@ -61,6 +61,13 @@ TEST(Comparisons, MatchNucleiWithNucleiAndSayWhatWasMatched) {
   const Json scaled = compared(fixture, analysis, {{"match", "um_per_px"}});
   EXPECT_EQ(scaled["result"]["simulated"]["um_per_px"], 0.05);
   EXPECT_THAT(scaled["result"]["verdict"][0].get<std::string>(), StartsWith("Matched by scale"));
+  // What the figure is made of goes: the result stays, the link does not.
+  EXPECT_EQ(fixture.ask("DELETE", analysis["links"]["self"].get<std::string>()).status, 204);
+  auto left = fixture.get(made["links"]["self"].get<std::string>());
+  EXPECT_TRUE(json_of(left)["links"]["figure"].is_null()) << left.body;
+  auto list = fixture.get("/v1/comparisons?limit=5");
+  ASSERT_EQ(json_of(list)["items"].size(), 3u);
+  for (const Json& shown : json_of(list)["items"]) EXPECT_TRUE(shown["links"]["figure"].is_null());
 }
 
 TEST(Comparisons, WarnWhereAnObjectIsNotKnownToBeACell) {
