@@ -70,7 +70,7 @@ Result<LabelImage> random_disc_control(const std::vector<LabelArea>& areas, cons
                                        std::optional<double> um_per_px = {});
 
 /// `colony` seen from above with all noise left out: the label of a pixel is the id of the smooth ellipsoid that reaches highest over its
-/// centre (ties: the lower id). Throws Stopped when asked to, between cells. The frame is that of the picture to compare with: left_um, top_um are x and y of its upper left corner.
+/// centre (ties: the lower id). The frame is that of the picture to compare with: left_um, top_um are x and y of its upper left corner. Throws Stopped.
 Result<LabelImage> noise_free_control(const Colony& colony, std::int64_t width_px, std::int64_t height_px,
                                       double um_per_px, double left_um, double top_um, StopFlag stop = nullptr);
 

@@ -119,7 +119,8 @@ http::Response get_comparisons(Context& context, const Call& call) {
 }
 http::Response get_comparison(Context& context, const Call& call) {
   const auto row = context.jobs.store().analyses().find(AnalysisKind::kComparison, call.id());
-  return row ? json_response(200, encode_analysis(with_job(context, *row), true, context.config.base_path)) : failure(row.error(), call);
+  if (!row) return failure(row.error(), call);
+  return json_response(200, encode_analysis(with_job(context, *row), true, context.config.base_path));
 }
 http::Response delete_comparison(Context& context, const Call& call) {
   return removed(context, call, AnalysisKind::kComparison);

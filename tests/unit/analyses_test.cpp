@@ -182,11 +182,11 @@ TEST(Analyses, CountDrawnDiscsAndKeepThem) {
   EXPECT_THAT(json_of(absent)["detail"].get<std::string>(), HasSubstr("there are grey, "));
   auto steps = fixture.get(made["links"]["steps"].get<std::string>());
   ASSERT_EQ(steps.status, 200) << steps.body;
-  const Json items = json_of(steps)["items"];
-  ASSERT_EQ(items.size(), made["result"]["steps"].size());
-  EXPECT_EQ(items[0]["name"], "grey");
-  EXPECT_FALSE(items[0]["text"].get<std::string>().empty());
-  EXPECT_EQ(fixture.get(items[0]["href"].get<std::string>()).status, 200);
+  const Json told = json_of(steps)["items"];
+  ASSERT_EQ(told.size(), made["result"]["steps"].size());
+  EXPECT_EQ(told[0]["name"], "grey");
+  EXPECT_FALSE(told[0]["text"].get<std::string>().empty());
+  EXPECT_EQ(fixture.get(told[0]["href"].get<std::string>()).status, 200);
   EXPECT_EQ(fixture.ask("DELETE", self).status, 204);
   EXPECT_EQ(fixture.get(self).status, 404);
 }

@@ -26,6 +26,8 @@ const std::string kAnalysis = "0190aaaa-bbbb-7ccc-8ddd-00000000abcd";
 json dimension(double value) { return {{"value", value}, {"se", 0.037}, {"r2", 0.993}, {"range_px", {3, 96}}}; }
 json line(double value, bool is_crossover) {
   return {{"d0", dimension(value)},
+          {"d0_smallest_cover", dimension(value + 0.01)},
+          {"d1", dimension(value - 0.01)},
           {"crossover", {{"found", is_crossover}}},
           {"curve", {{{"side_px", 3}, {"count_mean", 900.5}}, {{"side_px", 96}, {"count_mean", 8.25}}}},
           {"reason", nullptr}};
@@ -37,9 +39,14 @@ json measured_lines() {
 }
 json job_analysis() {
   json out = measured_lines();
-  out.update(json{{"time_h", 200.0}, {"cell_count", 180}, {"colony", {{"area_um2", 1.0}}}, {"cells", json::object()},
+  const json classes = {{{"sides", 6}, {"count", 50}, {"share", 0.46}, {"gibson_share", 0.464}}};
+  json seen = {{"classes", classes}, {"other_count", 3}, {"sides_mean", 5.5}, {"difference_max", 0.1}, {"chi_square", 9.0}, {"degrees", 4}, {"p_value", 0.06}};
+  json given = seen;
+  given.update(json{{"hole_count", 7}, {"hole_px", 90}, {"hole_max_px", 30}});
+  seen.update(json{{"interior_count", 50}, {"holes_given", given}});
+  out.update(json{{"time_h", 200.0}, {"last_seq", 9}, {"digest", "abc123"}, {"um_per_px", 0.5}, {"px_per_cell_diameter", 30.0}, {"cell_count", 180}, {"colony", {{"area_um2", 1.0}}}, {"cells", json::object()},
                   {"apart", json::object()}, {"packing", json::object()}, {"growth", json::object()},
-                  {"neighbours", {{"classes", {{{"sides", 6}, {"count", 50}, {"share", 0.46}, {"gibson_share", 0.464}}}}}}});
+                  {"sibling_straightness", json::object()}, {"rings", json::array()}, {"neighbours", seen}});
   return out;
 }
 json picture_analysis() {
