@@ -58,7 +58,7 @@ TEST_F(JobsTest, ALiveOriginIsForkedAtWhatItHasStored) {
   start();
   const std::string id = submit(new_job(3, 60));
   Watch(*service_, id).until_seq(20);
-  const JobRow origin = service_->pause(id)->view.job;
+  const JobRow origin = service_->pause(id, "tester")->view.job;
   ASSERT_EQ(origin.state, JobState::kPaused);
   const auto ahead = service_->fork_point(id, std::nullopt, origin.last_seq + 1);
   ASSERT_FALSE(ahead);
@@ -73,7 +73,7 @@ TEST_F(JobsTest, ALiveOriginIsForkedAtWhatItHasStored) {
   // The row is right before anybody goes on with it (a runner may have begun: its history only grows).
   EXPECT_GE(made->view.job.last_seq, origin.last_seq);
   const JobRow job = Watch(*service_, made->view.job.id).until_ended().job;
-  EXPECT_TRUE(service_->resume(id));
+  EXPECT_TRUE(service_->resume(id, "tester"));
   EXPECT_EQ(Watch(*service_, id).until_ended().job.digest, job.digest);
   // By time: all events up to it, also between two events; beyond the end the last state.
   const std::vector<Event> history = events(id);

@@ -79,7 +79,7 @@ TEST_F(Retention, WhatAVerificationReadsStays) {
   verification.spec_json = R"({"job_id": ")" + ids_[0] + R"(", "to_seq": 5})";
   const std::string id = submit(verification);  // queued
   EXPECT_EQ(round({1, 0}, now_ms() + 2 * kDay_ms), (std::vector<std::size_t>{2, 3}));
-  ASSERT_TRUE(service_->cancel(id));
+  ASSERT_TRUE(service_->cancel(id, "tester"));
   EXPECT_EQ(round({1, 0}, now_ms() + 2 * kDay_ms).size(), 2U);  // now it, and the verification itself
 }
 

@@ -94,10 +94,10 @@ TEST_F(JobsTest, ASlowPaceKeepsNobodyWaiting) {
   const std::string id = submit(new_job(4, 100'000));
   Watch watch(*service_, id);
   watch.until_seq(1);
-  EXPECT_EQ(service_->pause(id)->view.job.state, JobState::kPaused);
-  EXPECT_TRUE(service_->resume(id)->changed);
+  EXPECT_EQ(service_->pause(id, "tester")->view.job.state, JobState::kPaused);
+  EXPECT_TRUE(service_->resume(id, "tester")->changed);
   watch.until([](const JobView& view) { return view.job.state == JobState::kRunning; });
-  EXPECT_EQ(service_->cancel(id)->view.job.state, JobState::kCancelled);
+  EXPECT_EQ(service_->cancel(id, "tester")->view.job.state, JobState::kCancelled);
 }
 
 TEST_F(JobsTest, CancelEndsARunningJob) {

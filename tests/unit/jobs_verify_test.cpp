@@ -62,10 +62,10 @@ TEST_F(JobsTest, HistoriesThatEndedFromOutsideAndLiveOnesAreVerifiedToo) {
   start();
   const std::string cancelled = submit(new_job(4, 100'000));
   Watch(*service_, cancelled).until_seq(30);
-  ASSERT_TRUE(service_->cancel(cancelled));
+  ASSERT_TRUE(service_->cancel(cancelled, "tester"));
   const std::string live = submit(new_job(5, 100'000));
   Watch(*service_, live).until_seq(30);
-  ASSERT_TRUE(service_->pause(live));
+  ASSERT_TRUE(service_->pause(live, "tester"));
   const std::string empty = submit(new_job(6, 10));
   NewJob nothing = verification_of(service_->show(empty)->job);
   nothing.spec_json = empty + " 0";
@@ -89,13 +89,13 @@ TEST_F(JobsTest, AVerificationStopsAsOtherJobsDoAndBeginsAgain) {
   start();
   const std::string to_pause = submit(verification_of(target));
   gate.wait_until_reached();
-  std::thread pauser([&] { EXPECT_TRUE(service_->pause(to_pause)); });
+  std::thread pauser([&] { EXPECT_TRUE(service_->pause(to_pause, "tester")); });
   while (service_->show(to_pause)->job.command != "pause") std::this_thread::yield();
   gate.open();
   pauser.join();
   Watch watch(*service_, to_pause);
   EXPECT_EQ(watch.until([](const JobView& v) { return v.job.state != JobState::kRunning; }).job.state, JobState::kPaused);
-  EXPECT_TRUE(service_->resume(to_pause)->changed);
+  EXPECT_TRUE(service_->resume(to_pause, "tester")->changed);
   EXPECT_EQ(watch.until_ended().job.reason, "identical");
   // The end of the server leaves it running; the next start takes it up.
   service_->drain();
