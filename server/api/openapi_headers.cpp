@@ -31,7 +31,7 @@ bool is_paged(const Endpoint& endpoint) {
 }
 
 bool makes_something(const Endpoint& endpoint) {
-  for (const std::string_view id : {"submitJob", "forkJob", "verifyJob", "analyseImage", "compare"}) {
+  for (const std::string_view id : {"submitJob", "forkJob", "verifyJob", "analyseImage", "compare", "createToken"}) {
     if (endpoint.operation_id == id) return true;
   }
   return false;

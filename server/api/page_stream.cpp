@@ -10,6 +10,7 @@ namespace {
 
 constexpr std::size_t kPieceBytesMax = 64 * 1024;
 constexpr std::size_t kJobsPerRead = 20;
+constexpr std::size_t kEndedKeptMax = 1000;
 constexpr std::array kLive = {JobState::kRunning, JobState::kQueued, JobState::kPaused};
 
 void append_message(std::string& out, std::string_view event, const Json& data) {
@@ -52,10 +53,14 @@ void PageStream::tell(std::string& out, const JobView& view) {
   const JobRow& job = view.job;
   append_message(out, "job", encode_job(view, base_path_));
   if (!is_ready_) ++told_count_;
-  if (wish_.is_all && is_terminal(job.state)) {
-    told_.erase(job.job_key);  // it can only be renamed or go; both are news with all that they need
-  } else {
-    told_[job.job_key] = {job.id, job.revision, job.state};
+  told_[job.job_key] = {job.id, job.revision, job.state};
+  if (!wish_.is_all || !is_terminal(job.state)) return;
+  // Its end can be announced twice, by the runner and by the command. What ended long ago is forgotten: a job more that is told
+  // again is no harm, a list that grows for ever is.
+  ended_.push_back(job.job_key);
+  if (ended_.size() > kEndedKeptMax) {
+    told_.erase(ended_.front());
+    ended_.pop_front();
   }
 }
 

@@ -77,7 +77,8 @@ class PageStream : public http::BodySource {
   const Clock clock_;
   News news_;                                                 // synchronises itself
   std::unique_ptr<JobService::Subscription> subscription_;  // after news_: ends first
-  std::map<std::int64_t, Told> told_;  // of `all` only those that have not ended
+  std::map<std::int64_t, Told> told_;
+  std::deque<std::int64_t> ended_;  // of `all`: those in told_ that have ended, kEndedKeptMax at most
   std::size_t told_count_ = 0;
   bool is_first_ = true, is_ready_ = false;
   std::size_t state_index_ = 0;  // of the states that `begin` goes through,
