@@ -66,6 +66,7 @@ int run(const std::vector<std::string>& arguments, Environment& env) {
   add_data_commands(app, session, action);
   add_picture_commands(app, session, action);
   add_measure_commands(app, session, action);
+  add_analysis_commands(app, session, action);
   add_report_command(app, session, action);
   add_founders_command(app, session, action);
 

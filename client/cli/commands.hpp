@@ -23,6 +23,7 @@ void add_watch_command(CLI::App& app, Session& session, Action& action);
 void add_data_commands(CLI::App& app, Session& session, Action& action);     // events cells log
 void add_picture_commands(CLI::App& app, Session& session, Action& action);  // series image
 void add_measure_commands(CLI::App& app, Session& session, Action& action);  // lineage mesh measure analyze compare
+void add_analysis_commands(CLI::App& app, Session& session, Action& action);  // analyses comparisons, one of them, deletion
 void add_report_command(CLI::App& app, Session& session, Action& action);
 void add_founders_command(CLI::App& app, Session& session, Action& action);
 

@@ -20,7 +20,7 @@ constexpr std::chrono::milliseconds kPollInterval{500};
 
 struct FileOptions {
   std::string id, output;
-  std::optional<std::string> at_h, triangles_max;
+  std::optional<std::string> at_h, triangles_max, um_per_px, width_px;
   bool no_nuclei = false, cells = false;
 };
 
@@ -87,7 +87,7 @@ void print_sweep(std::ostream& out, const Json& measured) {
 
 ExitCode measure(Session& session, const FileOptions& options) {
   Target target = job_target(resolve_job_id(session, options.id), "/analysis");
-  target.add_if("at_h", options.at_h);
+  target.add_if("at_h", options.at_h).add_if("um_per_px", options.um_per_px).add_if("width_px", options.width_px);
   if (options.cells) {
     if (session.json) throw Failure(ExitCode::kUsage, "--json: the cells are a table; without --cells the measurements are JSON");
     return fetch_file(session, target, "text/csv", options.output);
@@ -108,8 +108,9 @@ ExitCode measure(Session& session, const FileOptions& options) {
 
 struct AnalyzeOptions {
   std::string file, steps, objects, html;
-  std::optional<std::string> name, um_per_px, foreground, channel, threshold, pipeline;
-  bool clahe = false;
+  std::optional<std::string> name, um_per_px, foreground, channel, threshold, pipeline, area_min_px, hole_max_px, background_reach_px,
+      window_radius_px;
+  bool clahe = false, no_split = false;
 };
 
 /// By the first bytes, as the server does; Failure kUsage for anything else.
@@ -194,10 +195,17 @@ ExitCode analyze(Session& session, const AnalyzeOptions& options) {
       .add_if("foreground", options.foreground)
       .add_if("channel", options.channel)
       .add_if("threshold", options.threshold)
-      .add_if("pipeline", options.pipeline);
+      .add_if("pipeline", options.pipeline)
+      .add_if("area_min_px", options.area_min_px)
+      .add_if("hole_max_px", options.hole_max_px)
+      .add_if("background_reach_px", options.background_reach_px)
+      .add_if("window_radius_px", options.window_radius_px);
   if (options.clahe) target.add("clahe", "true");
+  if (options.no_split) target.add("split", "false");
   request.target = target.text();
-  const Json row = when_done(session, session.client().send(request));
+  HttpResponse answer = session.client().send(request);
+  require_ok(answer, printable(options.file));
+  const Json row = when_done(session, std::move(answer));
   if (!options.steps.empty()) save_steps(session, row, options.steps);
   if (!options.objects.empty()) {
     fetch_file(session, Target(row.at("links").at("objects").get<std::string>()), "text/csv", options.objects);
@@ -228,13 +236,22 @@ ExitCode analyze(Session& session, const AnalyzeOptions& options) {
 
 struct CompareOptions {
   std::string id, analysis_id, figure;
-  std::optional<std::string> at_h, name;
+  std::optional<std::string> at_h, name, match, cell_count, cell_area_px;
 };
 
 ExitCode compare(Session& session, const CompareOptions& options) {
-  Json body = {{"job_id", resolve_job_id(session, options.id)}, {"analysis_id", options.analysis_id}};
+  Json body = {{"job_id", resolve_job_id(session, options.id)}, {"analysis_id", resolve_id(session, options.analysis_id, kAnalyses)}};
   if (options.at_h) body["at_h"] = number_option("--at-h", *options.at_h);
   if (options.name) body["name"] = *options.name;
+  if (options.match) body["match"] = *options.match;
+  if (options.cell_count) {
+    const double count = number_option("--cell-count", *options.cell_count);
+    if (!(count >= 1.0 && count <= 1e9 && count == static_cast<double>(static_cast<std::int64_t>(count)))) {
+      throw Failure(ExitCode::kUsage, "--cell-count: must be a whole number");
+    }
+    body["cell_count"] = static_cast<std::int64_t>(count);
+  }
+  if (options.cell_area_px) body["cell_area_px"] = number_option("--cell-area-px", *options.cell_area_px);
   HttpRequest request;
   request.method = "POST";
   request.target = "/v1/comparisons";
@@ -250,8 +267,8 @@ ExitCode compare(Session& session, const CompareOptions& options) {
   const Json& result = row.at("result");
   session.env.out << "comparison " << row.at("id").get<std::string>() << '\n';
   for (const char* side : {"simulated", "real"}) {
-    session.env.out << side << ", " << member_text(result.at(side), "cell_count") << " cells of "
-                    << member_text(result.at(side), "cell_area_mean_px", 0) << " px\n";
+    session.env.out << side << ", " << member_text(result.at(side), "object_count") << ' ' << printable(member_text(result.at(side), "object_kind"))
+                    << " of " << member_text(result.at(side), "object_area_mean_px", 0) << " px\n";
     print_lines(session.env.out, result.at(side));
   }
   print_verdict(session.env.out, result);
@@ -275,13 +292,15 @@ void add_measure_commands(CLI::App& app, Session& session, Action& action) {
 
   auto mesh = std::make_shared<FileOptions>();
   command = add_file_command(app, "mesh", "The surfaces of cells and nuclei, as binary glTF (GLB)", *mesh, true);
-  command->add_option("--triangles-max", mesh->triangles_max, "Most triangles");
+  command->add_option("--triangles-max", mesh->triangles_max, "Most triangles (default: 400 for each cell, within 200,000 to 4,000,000)");
   command->add_flag("--no-nuclei", mesh->no_nuclei, "Without nuclei");
   command->callback([&session, &action, mesh] { action = [&session, mesh] { return fetch_mesh(session, *mesh); }; });
 
   auto measured = std::make_shared<FileOptions>();
   command = add_file_command(app, "measure", "Measurements of a colony, with controls, and what follows from them", *measured, true);
   command->add_flag("--cells", measured->cells, "The shape of each cell instead, as CSV");
+  command->add_option("--um-per-px", measured->um_per_px, "Scale of the measured picture (instead of its width)");
+  command->add_option("--width-px", measured->width_px, "Width of the measured picture");
   command->callback([&session, &action, measured] { action = [&session, measured] { return measure(session, *measured); }; });
 
   auto picture = std::make_shared<AnalyzeOptions>();
@@ -294,6 +313,11 @@ void add_measure_commands(CLI::App& app, Session& session, Action& action) {
   command->add_option("--threshold", picture->threshold, "0 to 254 (default: by Otsu)");
   command->add_option("--pipeline", picture->pipeline, "auto, nuclei, phase or contours");
   command->add_flag("--clahe", picture->clahe, "Even the local contrast first");
+  command->add_flag("--no-split", picture->no_split, "nuclei: leave touching objects together");
+  command->add_option("--area-min-px", picture->area_min_px, "Smallest object (default: by the picture)");
+  command->add_option("--hole-max-px", picture->hole_max_px, "Largest hole that is filled (default: by the picture)");
+  command->add_option("--background-reach-px", picture->background_reach_px, "nuclei: wider than any object (default: a quarter of the shorter side)");
+  command->add_option("--window-radius-px", picture->window_radius_px, "phase: of the local deviation (default: 3)");
   command->add_option("--steps", picture->steps, "Folder for a picture of every step");
   command->add_option("--objects", picture->objects, "File for the shape of each object (CSV)");
   command->add_option("--html", picture->html, "File for everything on one page");
@@ -302,9 +326,12 @@ void add_measure_commands(CLI::App& app, Session& session, Action& action) {
   auto both = std::make_shared<CompareOptions>();
   command = app.add_subcommand("compare", "A colony against an analysed picture");
   command->add_option("ID", both->id, "Job id, or its unique end")->required();
-  command->add_option("ANALYSIS", both->analysis_id, "Id of the analysis, as `analyze` prints it")->required();
+  command->add_option("ANALYSIS", both->analysis_id, "Analysis id, or its unique end (`colony analyses` shows them)")->required();
   command->add_option("--at-h", both->at_h, "Model time, h (default: now, or the end)");
   command->add_option("--name", both->name, "A name for people");
+  command->add_option("--match", both->match, "object_area or um_per_px (default: object_area)");
+  command->add_option("--cell-count", both->cell_count, "How many cells the picture's objects are, if they are no cells");
+  command->add_option("--cell-area-px", both->cell_area_px, "Or the mean area of a cell in the picture");
   command->add_option("--figure", both->figure, "File for the figure (PNG)");
   command->callback([&session, &action, both] { action = [&session, both] { return compare(session, *both); }; });
 }

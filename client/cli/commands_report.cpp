@@ -23,14 +23,16 @@ ExitCode write_report(Session& session, const ReportOptions& options) {
   ReportInput input;
   Output output(session.env, options.output);
   input.job = get_json(session.client(), job_target(id).text());
+  // One moment for all that follows: of a job that goes on, each request would else show another colony.
+  const std::string at_h = options.at_h.value_or(input.job.at("progress").at("time_h").dump());
   input.series = get_json(session.client(), job_target(id, "/series").text()).at("items");
   if (input.job.at("progress").at("cells").get<std::uint64_t>() > 0) {
-    input.analysis = get_json(session.client(), job_target(id, "/analysis").add_if("at_h", options.at_h).text());
+    input.analysis = get_json(session.client(), job_target(id, "/analysis").add("at_h", at_h).text());
   }
   for (const char* style : {"brightfield", "phase", "shaded", "contours"}) {
     HttpRequest request;
     request.target =
-        job_target(id, "/image").add("style", style).add("width_px", "800").add_if("at_h", options.at_h).text();
+        job_target(id, "/image").add("style", style).add("width_px", "800").add("at_h", at_h).text();
     request.accept = "image/png";
     HttpResponse response = session.client().send(request);
     require_ok(response);

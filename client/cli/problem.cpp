@@ -10,7 +10,7 @@ std::string text_member(const Json& object, const char* name) {
 
 }  // namespace
 
-std::string problem_text(const HttpResponse& response) {
+std::string problem_text(const HttpResponse& response, const std::string& body_name) {
   const Json body = Json::parse(response.body, nullptr, false);
   std::string out;
   if (body.is_object() && body.contains("title")) {
@@ -21,7 +21,7 @@ std::string problem_text(const HttpResponse& response) {
       for (const Json& error : *errors) {
         if (!error.is_object()) continue;
         std::string field = text_member(error, error.contains("pointer") ? "pointer" : "parameter");
-        if (field.empty()) field = "(whole document)";  // the empty JSON Pointer
+        if (field.empty()) field = body_name;
         out += "\n  " + field + ": " + text_member(error, "message");
       }
     }
@@ -40,8 +40,8 @@ std::string problem_text(const HttpResponse& response) {
   return out;
 }
 
-void require_ok(const HttpResponse& response) {
-  if (!response.ok()) throw Failure(ExitCode::kRefused, problem_text(response));
+void require_ok(const HttpResponse& response, const std::string& body_name) {
+  if (!response.ok()) throw Failure(ExitCode::kRefused, problem_text(response, body_name));
 }
 
 Json body_json(const HttpResponse& response) {

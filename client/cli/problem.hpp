@@ -11,10 +11,11 @@ namespace colony::client {
 
 /// `<title>: <detail>`, one line `  <pointer or parameter>: <message>` for each error, the request id, when to try
 /// again. An answer that is no problem document (a proxy's page) is quoted, shortened.
-std::string problem_text(const HttpResponse& response);
+/// `body_name`: what the empty pointer, all of the body that was sent, is called.
+std::string problem_text(const HttpResponse& response, const std::string& body_name = "(whole document)");
 
 /// Throws Failure kRefused unless the answer is 2xx.
-void require_ok(const HttpResponse& response);
+void require_ok(const HttpResponse& response, const std::string& body_name = "(whole document)");
 
 /// The body as JSON. Failure kRefused for anything that is not: then this is not a colony server.
 Json body_json(const HttpResponse& response);

@@ -81,10 +81,15 @@ Curve curve_of(const Json& line, const char* name, const char* colour) {
 
 std::string dimension_row(const std::string& name, const Json& line) {
   const Json& d0 = line.at("d0");
-  if (d0.is_null()) return table_row(name, line.at("reason").is_string() ? line.at("reason").get<std::string>() : "-");
+  if (d0.is_null()) {
+    return "<tr><th>" + html_text(name) + "</th><td colspan=7>" +
+           html_text(line.at("reason").is_string() ? line.at("reason").get<std::string>() : "-") + "</td></tr>";
+  }
+  const auto value_of = [&](const char* member) { return "<td class=n>" + number(line.at(member).at("value").get<double>(), 3) + "</td>"; };
   const bool is_crossover = line.at("crossover").at("found").get<bool>();
   return "<tr><th>" + html_text(name) + "</th><td class=n>" + number(d0.at("value").get<double>(), 3) + "</td><td class=n>" +
-         number(d0.at("se").get<double>(), 3) + "</td><td class=n>" + number(d0.at("r2").get<double>(), 4) + "</td><td>" +
+         number(d0.at("se").get<double>(), 3) + "</td><td class=n>" + number(d0.at("r2").get<double>(), 4) + "</td>" +
+         value_of("d0_smallest_cover") + value_of("d1") + "<td>" +
          d0.at("range_px")[0].dump() + " to " + d0.at("range_px")[1].dump() + " px</td><td>" +
          (is_crossover ? "crossover, not scaling" : "no drift found") + "</td></tr>";
 }
@@ -106,8 +111,47 @@ std::string fractal_section(const Json& analysis) {
   std::string out = "<h2>Box counting</h2><ul>";
   for (const Json& sentence : analysis.at("verdict")) out += "<li>" + html_text(sentence.get<std::string>()) + "</li>";
   out += "</ul>" + curves_svg(curves, "side of a box, px", "boxes met", true);
-  return out + "<table><tr><th>line</th><th>D0</th><th>se of the line</th><th>r2</th><th>boxes</th><th>local slopes</th></tr>" + rows +
+  return out + "<table><tr><th>line</th><th>D0</th><th>se of the line</th><th>r2</th><th>D0 of the smallest cover</th><th>D1</th><th>boxes</th><th>local slopes</th></tr>" + rows +
          "</table>";
+}
+
+/// Sides as seen and with small holes given away, beside Gibson's table.
+std::string sides_section(const Json& neighbours) {
+  const Json& given = neighbours.at("holes_given");
+  std::string out = "<h2>Neighbours of interior cells</h2><table><tr><th>sides</th><th>cells, as seen</th><th>share</th>"
+                    "<th>cells, small holes given away</th><th>share</th><th>Gibson 2006</th></tr>";
+  const auto cell = [](const std::string& text) { return "<td class=n>" + text + "</td>"; };
+  for (std::size_t i = 0; i < neighbours.at("classes").size(); ++i) {
+    const Json &seen = neighbours.at("classes")[i], &closed = given.at("classes").at(i);
+    out += "<tr>" + cell(seen.at("sides").dump());
+    for (const Json* row : {&seen, &closed}) out += cell(row->at("count").dump()) + cell(number(row->at("share").get<double>(), 3));
+    out += cell(number(seen.at("gibson_share").get<double>(), 3)) + "</tr>";
+  }
+  std::string rows;
+  for (const char* name : {"interior_count", "other_count", "sides_mean", "difference_max", "chi_square", "degrees", "p_value"}) {
+    rows += table_row(std::string("as seen.") + name, neighbours.at(name).dump());
+  }
+  for (const char* name : {"hole_count", "hole_px", "hole_max_px", "other_count", "sides_mean", "difference_max", "chi_square", "degrees", "p_value"}) {
+    rows += table_row(std::string("small holes given away.") + name, given.at(name).dump());
+  }
+  return out + "</table><table>" + rows + "</table>";
+}
+
+std::string ring_section(const Json& rings) {
+  constexpr const char* kMembers[] = {"inner_px", "outer_px", "cell_count", "covered_px", "area_mean_px", "area_se_px", "density_per_px", "active_share"};
+  std::string out = "<h2>From the middle to the rim</h2><table><tr>";
+  for (const char* name : kMembers) out += "<th>" + std::string(name) + "</th>";
+  out += "</tr>";
+  for (const Json& ring : rings) {
+    out += "<tr>";
+    for (const char* name : kMembers) {
+      const Json& value = ring.at(name);
+      out += "<td class=n>" + (value.is_number_float() ? number(value.get<double>(), name == std::string_view("density_per_px") ? 6 : 2)
+                                                       : html_text(cell_text(value))) + "</td>";
+    }
+    out += "</tr>";
+  }
+  return out + "</table><p>Rings end at the farthest centre of a cell: the outer halves of the outermost cells are in none.</p>";
 }
 
 /// The dimensions against the threshold: a curve each and the table.
@@ -150,14 +194,19 @@ std::string page_head(const std::string& title) {
 
 std::string shape_section(const Json& analysis) {
   std::string rows;
-  for (const char* name : {"colony", "cells", "apart", "packing", "growth"}) add_leaves(analysis.at(name), name, rows);
-  std::string out = "<h2>Shapes, packing, growth</h2><table>" + rows + "</table><h2>Neighbours of interior cells</h2><table>";
-  out += "<tr><th>sides</th><th>cells</th><th>share</th><th>Gibson 2006</th></tr>";
-  for (const Json& row : analysis.at("neighbours").at("classes")) {
-    out += "<tr><td class=n>" + row.at("sides").dump() + "</td><td class=n>" + row.at("count").dump() + "</td><td class=n>" +
-           number(row.at("share").get<double>(), 3) + "</td><td class=n>" + number(row.at("gibson_share").get<double>(), 3) + "</td></tr>";
+  for (const char* name : {"colony", "cells", "apart", "packing", "growth", "sibling_straightness"}) add_leaves(analysis.at(name), name, rows);
+  return "<h2>Shapes, packing, growth</h2><table>" + rows + "</table>" + sides_section(analysis.at("neighbours")) +
+         ring_section(analysis.at("rings"));
+}
+
+/// What pictures and measurements are of.
+std::string moment_section(const Json& analysis) {
+  std::string out = "<h2>The colony at " + html_text(analysis.at("time_h").dump()) + " h</h2><table>";
+  for (const char* member : {"time_h", "last_seq", "cell_count", "um_per_px", "px_per_cell_diameter"}) {
+    out += table_row(member, member_text(analysis, member, 4));
   }
-  return out + "</table>";
+  return out + "<tr><th>digest</th><td><code>" + html_text(analysis.at("digest").get<std::string>()) + "</code></td></tr></table>" +
+         "<p>All pictures and measurements below are of this moment.</p>";
 }
 
 std::string growth_section(const Json& series) {
@@ -255,11 +304,13 @@ std::string report_html(const ReportInput& input) {
   for (const char* member : {"id", "state", "reason", "created_at", "finished_at", "engine_version"}) {
     out += table_row(member, cell_text(job.at(member)));
   }
+  // The job's own last state, which is not what a report of an earlier time shows.
   for (const char* member : {"time_h", "cells", "active", "passive", "senescent"}) {
-    out += table_row(member, member_text(job.at("progress"), member));
+    out += table_row(std::string("latest ") + member, member_text(job.at("progress"), member));
   }
-  out += table_row("events", member_text(job, "last_seq"));
-  out += "<tr><th>digest</th><td><code>" + html_text(job.at("digest").get<std::string>()) + "</code></td></tr></table>";
+  out += table_row("latest event", member_text(job, "last_seq"));
+  out += "<tr><th>latest digest</th><td><code>" + html_text(job.at("digest").get<std::string>()) + "</code></td></tr></table>";
+  if (!input.analysis.is_null()) out += moment_section(input.analysis);
   out += "<h2>Pictures</h2>" + figures(input.pictures);
   out += growth_section(input.series);
   if (!input.analysis.is_null()) out += fractal_section(input.analysis) + shape_section(input.analysis);

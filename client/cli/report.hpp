@@ -15,7 +15,7 @@ namespace colony::client {
 struct ReportInput {
   Json job;       // GET /v1/jobs/{id}
   Json series;    // its items
-  Json analysis;  // GET /v1/jobs/{id}/analysis, or null where there is nothing to measure
+  Json analysis;  // GET /v1/jobs/{id}/analysis, or null where there is nothing to measure; it says of which moment it is, the pictures are of the same
   std::vector<std::pair<std::string, std::string>> pictures;  // caption, PNG bytes
 };
 

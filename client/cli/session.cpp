@@ -75,14 +75,17 @@ std::string link_target(Session& session, const Json& row, const char* name) {
 
 Target job_target(const std::string& id, const std::string& rest) { return Target("/v1/jobs/" + id + rest); }
 
-std::string resolve_job_id(Session& session, const std::string& text) {
+std::string resolve_job_id(Session& session, const std::string& text) { return resolve_id(session, text, kJobs); }
+
+std::string resolve_id(Session& session, const std::string& text, const Collection& in) {
+  const std::string one = in.one;
   std::string wanted = text;
   std::transform(wanted.begin(), wanted.end(), wanted.begin(), [](unsigned char c) { return std::tolower(c); });
   const bool plausible =
       wanted.find_first_not_of("0123456789abcdef-") == std::string::npos && wanted.size() <= kIdLength;
   if (!plausible || wanted.size() < kSuffixMin) {
-    throw Failure(ExitCode::kUsage, "'" + printable(text) + "' is no job id: give a full id or at least its last " +
-                                        std::to_string(kSuffixMin) + " characters (`colony list` shows them)");
+    throw Failure(ExitCode::kUsage, "'" + printable(text) + "' is no " + one + " id: give a full id or at least its last " +
+                                        std::to_string(kSuffixMin) + " characters (`colony " + in.command + "` shows them)");
   }
   if (is_full_id(wanted)) return wanted;
 
@@ -90,29 +93,29 @@ std::string resolve_job_id(Session& session, const std::string& text) {
   std::optional<std::string> cursor;
   for (int page = 0; page < kPagesMax; ++page) {
     const Json body = get_json(
-        session.client(), Target("/v1/jobs").add("limit", std::to_string(kPageLimit)).add_if("cursor", cursor).text());
+        session.client(), Target(in.path).add("limit", std::to_string(kPageLimit)).add_if("cursor", cursor).text());
     const auto items = body.is_object() ? body.find("items") : body.end();
     if (items == body.end() || !items->is_array())
-      throw Failure(ExitCode::kRefused, "the server's list of jobs has no items");
-    for (const Json& job : *items) {
+      throw Failure(ExitCode::kRefused, std::string("the server's list at ") + in.path + " has no items");
+    for (const Json& item : *items) {
       const std::string id =
-          job.is_object() && job.contains("id") && job["id"].is_string() ? job["id"].get<std::string>() : "";
+          item.is_object() && item.contains("id") && item["id"].is_string() ? item["id"].get<std::string>() : "";
       if (id.ends_with(wanted)) matches.push_back(id);
     }
     const auto next = body.find("next");
     if (next == body.end() || !next->is_string()) break;
     cursor = next->get<std::string>();
   }
-  if (matches.empty()) throw Failure(ExitCode::kRefused, "no job's id ends in '" + wanted + "'");
+  if (matches.empty()) throw Failure(ExitCode::kRefused, "no " + one + "'s id ends in '" + wanted + "'");
   if (matches.size() > 1) {
     std::string message =
-        "'" + wanted + "' is the end of " + std::to_string(matches.size()) + " job ids; give more of it:";
+        "'" + wanted + "' is the end of " + std::to_string(matches.size()) + " " + one + " ids; give more of it:";
     for (std::size_t i = 0; i < std::min<std::size_t>(matches.size(), 5); ++i)
       message += "\n  " + printable(matches[i]);
     if (matches.size() > 5) message += "\n  ...";
     throw Failure(ExitCode::kUsage, message);
   }
-  if (!is_full_id(matches[0])) throw Failure(ExitCode::kRefused, "the server lists a job whose id is no UUID");
+  if (!is_full_id(matches[0])) throw Failure(ExitCode::kRefused, "the server lists a " + one + " whose id is no UUID");
   return matches[0];
 }
 

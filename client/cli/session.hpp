@@ -30,8 +30,19 @@ struct Session {
   std::unique_ptr<HttpClient> client_;
 };
 
-/// The full id for a full id (not looked up) or for the unique end of one, found in the server's list of jobs.
-/// Errors: kUsage for what cannot be an id or is ambiguous (the candidates are named), kRefused when no job ends so.
+/// What ids are looked up in.
+struct Collection {
+  const char* path;     // of its list
+  const char* one;      // "job"
+  const char* command;  // that lists it
+};
+inline constexpr Collection kJobs{"/v1/jobs", "job", "list"};
+inline constexpr Collection kAnalyses{"/v1/analyses", "analysis", "analyses"};
+inline constexpr Collection kComparisons{"/v1/comparisons", "comparison", "comparisons"};
+
+/// The full id for a full id (not looked up) or for the unique end of one, found in the server's list.
+/// Errors: kUsage for what cannot be an id or is ambiguous (the candidates are named), kRefused when none ends so.
+std::string resolve_id(Session& session, const std::string& text, const Collection& in);
 std::string resolve_job_id(Session& session, const std::string& text);
 
 /// A link of an answer as a target of this client: links begin with the server's base path, and so does --server.

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <opencv2/imgproc.hpp>
 #include <tuple>
 
+#include "engine/analysis/opencv.hpp"
 #include "engine/base/maths.hpp"
 #include "engine/random/stream.hpp"
 
@@ -15,15 +17,10 @@ Error wrong(ErrorCode code, const std::string& field, const std::string& message
   return {code, field + ": " + message, {{field, message}}};
 }
 
-struct Disc {
-  std::uint32_t label = 0;
-  double x = 0.0, y = 0.0, radius = 0.0;
-};
-
-/// Discs in a frame that holds them with a margin; a pixel is its centre.
-Result<LabelImage> draw_discs(std::vector<Disc> discs, double margin, std::optional<double> um_per_px) {
+/// Discs in a frame that holds them with a margin.
+Result<LabelImage> framed(std::vector<LabelDisc> discs, double margin, std::optional<double> um_per_px) {
   double left = discs.front().x, right = left, top = discs.front().y, bottom = top;
-  for (const Disc& disc : discs) {
+  for (const LabelDisc& disc : discs) {
     left = std::min(left, disc.x - disc.radius);
     right = std::max(right, disc.x + disc.radius);
     top = std::min(top, disc.y - disc.radius);
@@ -35,27 +32,47 @@ Result<LabelImage> draw_discs(std::vector<Disc> discs, double margin, std::optio
     return wrong(ErrorCode::kLimit, "areas", "the control would be larger than 20000 pixels a side");
   }
   LabelImage image(static_cast<std::int64_t>(width) + 1, static_cast<std::int64_t>(height) + 1, um_per_px);
-  std::vector<float> power(image.values.size(), 0.0F);  // d^2 - r^2 of the owner
-  for (Disc& disc : discs) {
+  for (LabelDisc& disc : discs) {
     disc.x += margin - left;
     disc.y += margin - top;
-    const auto first_row = static_cast<std::int64_t>(disc.y - disc.radius);
-    const auto last_row = std::min(image.height_px - 1, static_cast<std::int64_t>(disc.y + disc.radius));
-    const auto first_column = static_cast<std::int64_t>(disc.x - disc.radius);
-    const auto last_column = std::min(image.width_px - 1, static_cast<std::int64_t>(disc.x + disc.radius));
-    for (std::int64_t row = first_row; row <= last_row; ++row) {
-      const double dy = static_cast<double>(row) + 0.5 - disc.y;
-      for (std::int64_t column = first_column; column <= last_column; ++column) {
-        const double dx = static_cast<double>(column) + 0.5 - disc.x;
-        const auto here = static_cast<float>(dx * dx + dy * dy - disc.radius * disc.radius);
-        const std::size_t at = image.index(row, column);
-        if (here > 0.0F || (image.values[at] != 0 && here >= power[at])) continue;
-        image.values[at] = disc.label;
-        power[at] = here;
-      }
+  }
+  draw_discs(discs, image);
+  return image;
+}
+
+Status check_hull(const Hull& hull) {
+  const auto pixels = static_cast<std::size_t>(std::max<std::int64_t>(hull.width_px, 0)) *
+                      static_cast<std::size_t>(std::max<std::int64_t>(hull.height_px, 0));
+  if (Status status = check_image_shape(hull.width_px, hull.height_px, pixels, {}, "hull"); !status) return status;
+  if (hull.area_px < 1) return wrong(ErrorCode::kInvalid, "hull", "has no pixels");
+  return Ok{};
+}
+
+struct Place {
+  double distance2 = 0.0, x = 0.0, y = 0.0;
+  friend bool operator<(const Place& a, const Place& b) { return std::tie(a.distance2, a.y, a.x) < std::tie(b.distance2, b.y, b.x); }
+};
+
+/// Points of the hexagonal lattice about (x, y) that lie in the hull.
+std::vector<Place> lattice_in(const Hull& hull, double x, double y, double spacing) {
+  std::vector<Place> places;
+  const double height = spacing * std::sqrt(3.0) / 2.0;
+  const auto rows = static_cast<std::int64_t>(static_cast<double>(hull.height_px) / height) + 1;
+  for (std::int64_t j = -rows; j <= rows; ++j) {
+    const double at_y = y + height * static_cast<double>(j);
+    if (!(at_y >= 0.0 && at_y < static_cast<double>(hull.height_px))) continue;
+    const Hull::Span& span = hull.rows[static_cast<std::size_t>(at_y)];
+    // Only the columns of the span are gone through: a long thin hull lies in a frame of many more.
+    const double first_x = x + (j % 2 != 0 ? 0.5 * spacing : 0.0);
+    const auto first = static_cast<std::int64_t>((static_cast<double>(span.first) - first_x) / spacing) - 1;
+    for (std::int64_t i = first;; ++i) {
+      const double at_x = first_x + spacing * static_cast<double>(i);
+      if (at_x >= static_cast<double>(span.end)) break;
+      if (at_x < static_cast<double>(span.first)) continue;
+      places.push_back({(at_x - x) * (at_x - x) + (at_y - y) * (at_y - y), at_x, at_y});
     }
   }
-  return image;
+  return places;
 }
 
 Status check_areas(const std::vector<LabelArea>& areas) {
@@ -86,6 +103,29 @@ double smooth_top_um(const Body& body, double x_um, double y_um) {
 
 }  // namespace
 
+void draw_discs(const std::vector<LabelDisc>& discs, LabelImage& image) {
+  std::vector<float> power(image.values.size(), 0.0F);  // d^2 - r^2 of the owner
+  // The clamp comes before the conversion.
+  const auto inside = [](double at, std::int64_t count) {
+    return static_cast<std::int64_t>(std::clamp(at, 0.0, static_cast<double>(count - 1)));
+  };
+  for (const LabelDisc& disc : discs) {
+    const std::int64_t last_row = inside(disc.y + disc.radius, image.height_px);
+    const std::int64_t first_column = inside(disc.x - disc.radius, image.width_px), last_column = inside(disc.x + disc.radius, image.width_px);
+    for (std::int64_t row = inside(disc.y - disc.radius, image.height_px); row <= last_row; ++row) {
+      const double dy = static_cast<double>(row) + 0.5 - disc.y;
+      for (std::int64_t column = first_column; column <= last_column; ++column) {
+        const double dx = static_cast<double>(column) + 0.5 - disc.x;
+        const auto here = static_cast<float>(dx * dx + dy * dy - disc.radius * disc.radius);
+        const std::size_t at = image.index(row, column);
+        if (here > 0.0F || (image.values[at] != 0 && here >= power[at])) continue;
+        image.values[at] = disc.label;
+        power[at] = here;
+      }
+    }
+  }
+}
+
 std::vector<LabelArea> label_areas(const LabelImage& labels) {
   std::map<std::uint32_t, std::uint64_t> areas;
   for (std::size_t i = 0; i < labels.values.size();) {
@@ -110,19 +150,19 @@ Result<LabelImage> hexagonal_control(const std::vector<LabelArea>& areas, std::o
     for (std::int64_t i = -2 * reach; i <= 2 * reach; ++i) points.emplace_back(i * i + i * j + j * j, j, i);
   }
   std::sort(points.begin(), points.end());
-  std::vector<Disc> discs;
+  std::vector<LabelDisc> discs;
   for (std::size_t k = 0; k < areas.size(); ++k) {
     const auto [distance, j, i] = points[k];
     const double x = 2.0 * (static_cast<double>(i) + 0.5 * static_cast<double>(j));
     discs.push_back({static_cast<std::uint32_t>(k + 1), radius * x, radius * std::sqrt(3.0) * static_cast<double>(j), radius});
   }
-  return draw_discs(std::move(discs), std::max(radius, 1.0), um_per_px);
+  return framed(std::move(discs), std::max(radius, 1.0), um_per_px);
 }
 
 Result<LabelImage> random_disc_control(const std::vector<LabelArea>& areas, Seed seed, std::optional<double> um_per_px) {
   if (const Status status = check_areas(areas); !status) return status.error();
   const double reach = radius_of(total_area(areas));
-  std::vector<Disc> discs;
+  std::vector<LabelDisc> discs;
   for (const LabelArea& area : areas) {
     Stream stream(seed, CellId{area.label}, 0, Purpose::kControl);
     const double distance = reach * std::sqrt(stream.uniform());
@@ -130,11 +170,102 @@ Result<LabelImage> random_disc_control(const std::vector<LabelArea>& areas, Seed
     discs.push_back({area.label, distance * turn.cos, distance * turn.sin, radius_of(static_cast<double>(area.area_px))});
   }
   const double margin = std::max(1.0, radius_of(total_area(areas) / static_cast<double>(areas.size())));
-  return draw_discs(std::move(discs), margin, um_per_px);
+  return framed(std::move(discs), margin, um_per_px);
+}
+
+Hull hull_of(const LabelImage& labels) {
+  Hull hull;
+  hull.width_px = labels.width_px;
+  hull.height_px = labels.height_px;
+  hull.rows.resize(static_cast<std::size_t>(std::max<std::int64_t>(labels.height_px, 0)));
+  std::vector<cv::Point> corners, polygon;
+  for (std::int64_t row = 0; row < labels.height_px; ++row) {
+    const std::uint32_t* pixels = labels.row(row);
+    std::int64_t first = 0, end = labels.width_px;
+    while (first < end && pixels[first] == 0) ++first;
+    while (end > first && pixels[end - 1] == 0) --end;
+    if (first == end) continue;
+    for (const std::int64_t y : {row, row + 1}) {
+      corners.emplace_back(static_cast<int>(first), static_cast<int>(y));
+      corners.emplace_back(static_cast<int>(end), static_cast<int>(y));
+    }
+  }
+  if (corners.empty()) return hull;
+  settle_opencv();
+  cv::convexHull(corners, polygon);
+  std::vector<double> left(hull.rows.size(), static_cast<double>(labels.width_px)), right(hull.rows.size(), 0.0);
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const cv::Point& a = polygon[i];
+    const cv::Point& b = polygon[(i + 1) % polygon.size()];
+    for (int row = std::min(a.y, b.y); row < std::max(a.y, b.y); ++row) {
+      const double share = (row + 0.5 - a.y) / (b.y - a.y), x = a.x + share * (b.x - a.x);
+      const auto at = static_cast<std::size_t>(row);
+      left[at] = std::min(left[at], x);
+      right[at] = std::max(right[at], x);
+    }
+  }
+  for (std::size_t row = 0; row < hull.rows.size(); ++row) {
+    // Centres at column + 0.5 from `left` to `right`, neither of which is negative.
+    const auto first = static_cast<std::int64_t>(left[row] + 0.5), end = static_cast<std::int64_t>(right[row] + 0.5);
+    if (end > first) hull.rows[row] = {first, end};
+    hull.area_px += std::max<std::int64_t>(0, end - first);
+  }
+  return hull;
+}
+
+Result<LabelImage> hexagonal_control(const std::vector<LabelArea>& areas, const Hull& hull, std::optional<double> um_per_px) {
+  if (const Status status = check_areas(areas); !status) return status.error();
+  if (const Status status = check_hull(hull); !status) return status.error();
+  double x = 0.0, y = 0.0;  // the hull's centre
+  for (std::size_t row = 0; row < hull.rows.size(); ++row) {
+    const auto first = static_cast<double>(hull.rows[row].first), end = static_cast<double>(hull.rows[row].end);
+    x += (end - first) * (first + end) / 2.0;
+    y += (end - first) * (static_cast<double>(row) + 0.5);
+  }
+  const auto area = static_cast<double>(hull.area_px), count = static_cast<double>(areas.size());
+  x /= area;
+  y /= area;
+  // The widest lattice with enough points. Their number falls with the spacing but for single steps, so the last one that had enough is kept.
+  double low = 0.0, high = 2.0 * std::sqrt(2.0 / std::sqrt(3.0) * area / count);
+  std::vector<Place> places;
+  constexpr int kHalvings = 20;
+  for (int i = 0; i < kHalvings || places.empty(); ++i) {
+    const double spacing = (low + high) / 2.0;
+    std::vector<Place> found = lattice_in(hull, x, y, spacing);
+    const bool enough = found.size() >= areas.size();
+    (enough ? low : high) = spacing;
+    if (enough) places = std::move(found);
+  }
+  std::sort(places.begin(), places.end());
+  const double radius = radius_of(total_area(areas) / count);
+  std::vector<LabelDisc> discs;
+  for (std::size_t k = 0; k < areas.size(); ++k) discs.push_back({static_cast<std::uint32_t>(k + 1), places[k].x, places[k].y, radius});
+  LabelImage image(hull.width_px, hull.height_px, um_per_px);
+  draw_discs(discs, image);
+  return image;
+}
+
+Result<LabelImage> random_disc_control(const std::vector<LabelArea>& areas, const Hull& hull, Seed seed, std::optional<double> um_per_px) {
+  if (const Status status = check_areas(areas); !status) return status.error();
+  if (const Status status = check_hull(hull); !status) return status.error();
+  std::vector<std::int64_t> above(hull.rows.size() + 1, 0);  // pixels of the rows before
+  for (std::size_t row = 0; row < hull.rows.size(); ++row) above[row + 1] = above[row] + hull.rows[row].end - hull.rows[row].first;
+  std::vector<LabelDisc> discs;
+  for (const LabelArea& area : areas) {
+    Stream stream(seed, CellId{area.label}, 0, Purpose::kControl);
+    const double at = stream.uniform() * static_cast<double>(hull.area_px);  // a place along all rows, one after the other
+    const auto pixel = std::min(static_cast<std::int64_t>(at), hull.area_px - 1);
+    const auto row = static_cast<std::size_t>(std::upper_bound(above.begin(), above.end(), pixel) - above.begin() - 1);
+    const double x = static_cast<double>(hull.rows[row].first) + (at - static_cast<double>(above[row]));
+    discs.push_back({area.label, x, static_cast<double>(row) + stream.uniform(), radius_of(static_cast<double>(area.area_px))});
+  }
+  LabelImage image(hull.width_px, hull.height_px, um_per_px);
+  draw_discs(discs, image);
+  return image;
 }
 
 Result<LabelImage> noise_free_control(const Colony& colony, std::int64_t width_px, std::int64_t height_px,
-                                      double um_per_px, double left_um, double top_um) {
+                                      double um_per_px, double left_um, double top_um, StopFlag stop) {
   const auto pixels = width_px > 0 && height_px > 0 && width_px <= kImageSideMax_px && height_px <= kImageSideMax_px
                           ? static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px)
                           : std::size_t{0};
@@ -155,6 +286,7 @@ Result<LabelImage> noise_free_control(const Colony& colony, std::int64_t width_p
     return static_cast<std::int64_t>(std::clamp(um / um_per_px + 2.0, 0.0, static_cast<double>(count)));
   };
   for (const Cell& cell : colony.cells()) {
+    throw_if_stopped(stop);
     const Body& body = colony.body(cell.id);
     const Vec2 half = body.footprint_half_extent_um();
     const double x = body.centre_um().x() - left_um, y = top_um - body.centre_um().y();

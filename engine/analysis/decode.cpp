@@ -10,9 +10,6 @@ namespace {
 
 using std::string_view_literals::operator""sv;
 
-/// A few bytes more than any ratio would allow: headers make the smallest files larger than their pixels.
-constexpr std::int64_t kClaimSlack_bytes = 64 << 10;
-
 bool looks_like_text(std::string_view bytes) {
   const std::string_view head = bytes.substr(0, 64);
   return std::all_of(head.begin(), head.end(), [](char c) {

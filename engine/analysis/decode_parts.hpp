@@ -20,6 +20,9 @@ struct Claim {
   std::int64_t expansion_max = 0;
 };
 
+/// A few bytes more than any ratio would allow: headers make the smallest files larger than their pixels.
+inline constexpr std::int64_t kClaimSlack_bytes = 64 << 10;
+
 /// kLimit, or kMalformed where `file_bytes` cannot hold what is claimed.
 Status check_claim(const Claim& claim, std::size_t file_bytes, const DecodeLimits& limits);
 

@@ -26,6 +26,20 @@ struct Layout {
   int bits = 8;
 };
 
+/// Whether chunk acTL stands before the pixels: an animation, of which a decoder that does not know it sees the first picture.
+bool is_animated(std::string_view bytes) {
+  constexpr std::size_t kSignature_bytes = 8, kAroundData_bytes = 12;
+  for (std::size_t at = kSignature_bytes; at + kAroundData_bytes <= bytes.size();) {
+    const std::string_view type = bytes.substr(at + 4, 4);
+    if (type == "acTL") return true;
+    if (type == "IDAT") return false;
+    std::size_t length = 0;
+    for (std::size_t i = 0; i < 4; ++i) length = length << 8 | static_cast<unsigned char>(bytes[at + i]);
+    at += kAroundData_bytes + length;
+  }
+  return false;
+}
+
 /// The format in which libspng hands the pixels over: palettes and few bits spread to 8 bits, 16 bits kept, transparency as a channel.
 Layout layout_of(const spng_ihdr& header, bool has_trns) {
   const bool wide = header.bit_depth == 16;
@@ -92,6 +106,7 @@ Result<DecodedImage> decode_png(std::string_view bytes, const DecodeLimits& limi
     }
   }
 
+  if (is_animated(bytes)) image.notes.emplace_back("of the animation (APNG) only the first picture was read");
   image.model = layout.channels <= 2 ? ColourModel::kGrey : ColourModel::kRgb;
   if (layout.channels == 2 || layout.channels == 4) blend_alpha(image, false);
   spng_phys physical{};

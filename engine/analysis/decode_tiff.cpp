@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <array>
 #include <cstdarg>
-#include <cstdio>
 #include <cstring>
 #include <iterator>
 #include <memory>
@@ -14,8 +13,9 @@
 namespace colony::decode_parts {
 namespace {
 
-// A strip or tile may be larger than the image (tiles are padded), but not beyond this.
-constexpr std::int64_t kBlockMax_px = 4096 * 4096;
+// A side of a tile may be that of the image rounded up as tiles must be, or what programs take whatever the image is. Memory is asked for a whole tile.
+constexpr std::uint32_t kTileSideStep_px = 16;
+constexpr std::uint32_t kTileSideAlways_px = 1024;
 constexpr tmsize_t kTableMax_bytes = 64 << 20;  // the largest single table or compressed block that libtiff may ask for
 constexpr std::size_t kDescriptionMax_bytes = 4096;
 constexpr double kUmPerCentimetre = 1e4;
@@ -23,7 +23,7 @@ constexpr double kUmPerCentimetre = 1e4;
 struct Source {
   std::string_view bytes;
   std::uint64_t position = 0;
-  std::string message;  // the first error of libtiff
+  bool failed = false;  // libtiff said so; in which words is for its own developers
 
   static Source& of(thandle_t handle) { return *static_cast<Source*>(handle); }
 };
@@ -51,12 +51,8 @@ toff_t seek_to(thandle_t handle, toff_t offset, int whence) {
 }
 
 // Both return 1: the process-wide handlers, which print, are not called.
-int keep_error(TIFF*, void* user_data, const char*, const char* format, std::va_list arguments) {
-  std::string& message = static_cast<Source*>(user_data)->message;
-  if (!message.empty()) return 1;
-  std::array<char, 256> text{};
-  std::vsnprintf(text.data(), text.size(), format, arguments);
-  message = text.data();
+int keep_error(TIFF*, void* user_data, const char*, const char*, std::va_list) {
+  static_cast<Source*>(user_data)->failed = true;
   return 1;
 }
 int drop_warning(TIFF*, void*, const char*, const char*, std::va_list) { return 1; }
@@ -77,6 +73,23 @@ struct Page {
   std::uint16_t alpha = EXTRASAMPLE_UNSPECIFIED;  // of the last channel
   std::array<const std::uint16_t*, 3> palette{};
 
+  /// The most bytes of samples that a byte of the file can become; 0: a compression that is not read.
+  std::int64_t expansion_max() const {
+    switch (compression) {
+      case COMPRESSION_NONE:
+        return 1;
+      case COMPRESSION_PACKBITS:
+        return 64;  // 128 bytes from 2
+      case COMPRESSION_LZW:
+        return 2731;  // 4,096 bytes from 12 bits
+      case COMPRESSION_DEFLATE:
+      case COMPRESSION_ADOBE_DEFLATE:
+        return 1032;  // 258 bytes from 2 bits
+      default:
+        return 0;
+    }
+  }
+
   bool same_shape(const Page& other) const {
     return width == other.width && height == other.height && bits == other.bits && channels == other.channels &&
            photometric == other.photometric && format == other.format;
@@ -85,13 +98,11 @@ struct Page {
 
 class Reader {
  public:
-  Reader(std::string_view bytes, const DecodeLimits& limits) : source_{bytes, 0, {}}, limits_(limits) {}
+  Reader(std::string_view bytes, const DecodeLimits& limits) : source_{bytes, 0, false}, limits_(limits) {}
   Result<DecodedImage> read();
 
  private:
-  Error failed(const std::string& what) const {
-    return malformed("damaged or cut-off TIFF: " + (source_.message.empty() ? what : source_.message));
-  }
+  static Error failed(const std::string& what) { return malformed("damaged or cut-off TIFF: " + what); }
   Result<Page> page() const;
   Status check(const Page& page, std::int64_t channel_count) const;
   Status append(const Page& page, DecodedImage& image, std::int64_t first_channel);
@@ -149,24 +160,10 @@ Status Reader::check(const Page& page, std::int64_t channel_count) const {
   }
   if (page.photometric == PHOTOMETRIC_RGB && page.channels < 3)
     return malformed("a TIFF in RGB states fewer than 3 channels");
-  std::int64_t expansion = 0;
-  switch (page.compression) {
-    case COMPRESSION_NONE:
-      expansion = 1;
-      break;
-    case COMPRESSION_PACKBITS:
-      expansion = 64;
-      break;  // 128 bytes from 2
-    case COMPRESSION_LZW:
-      expansion = 2731;
-      break;  // 4,096 bytes from 12 bits
-    case COMPRESSION_DEFLATE:
-    case COMPRESSION_ADOBE_DEFLATE:
-      expansion = 1032;
-      break;  // 258 bytes from 2 bits
-    default:
-      return not_read("a TIFF with compression " + std::to_string(page.compression) +
-                      " is not read: save it uncompressed or with LZW, deflate or PackBits");
+  const std::int64_t expansion = page.expansion_max();
+  if (expansion == 0) {
+    return not_read("a TIFF with compression " + std::to_string(page.compression) +
+                    " is not read: save it uncompressed or with LZW, deflate or PackBits");
   }
   // What lies in the file is one page; what it becomes in memory is checked with no such bound.
   if (Status status =
@@ -182,7 +179,7 @@ Status Reader::read_block(bool tiled, std::uint32_t block, std::int64_t bytes) {
   const auto size = static_cast<tmsize_t>(bytes);
   const tmsize_t got = tiled ? TIFFReadEncodedTile(tiff_.get(), block, block_.data(), size)
                              : TIFFReadEncodedStrip(tiff_.get(), block, block_.data(), size);
-  if (got != size) return failed("a strip or tile is short");
+  if (got != size) return failed(std::string(tiled ? "tile " : "strip ") + std::to_string(block) + " cannot be read");
   return Ok{};
 }
 
@@ -223,12 +220,19 @@ Status Reader::append(const Page& page, DecodedImage& image, std::int64_t first_
   const bool planar = page.planar == PLANARCONFIG_SEPARATE && page.channels > 1;
   const std::int64_t block_channels = planar ? 1 : page.channels;
   const std::int64_t pixel_bytes = block_channels * page.bits / 8;
-  // The sides are bounded first: their product must fit.
-  if (block_width > limits_.side_max_px || block_height > limits_.side_max_px ||
-      std::int64_t{block_width} * block_height > std::max(image.pixel_count(), kBlockMax_px)) {
-    return Error{ErrorCode::kLimit, "the TIFF's strips or tiles are too large"};
+  const auto fits = [](std::uint32_t side, std::uint32_t image_side) {
+    return side <= std::max((image_side + kTileSideStep_px - 1) / kTileSideStep_px * kTileSideStep_px, kTileSideAlways_px);
+  };
+  if (!fits(block_width, page.width) || !fits(block_height, page.height)) {
+    return Error{ErrorCode::kLimit, "the TIFF's tiles of " + std::to_string(block_width) + " x " + std::to_string(block_height) +
+                                        " pixels are too large for an image of " + std::to_string(page.width) + " x " +
+                                        std::to_string(page.height)};
   }
+  // Both sides are at most 50,015, so the product fits.
   const std::int64_t full_bytes = std::int64_t{block_width} * block_height * pixel_bytes;
+  if (full_bytes > static_cast<std::int64_t>(source_.bytes.size()) * page.expansion_max() + kClaimSlack_bytes) {
+    return failed("it states strips or tiles of " + std::to_string(full_bytes) + " bytes, more than the file can hold");
+  }
   if (tiled ? TIFFTileSize64(tiff_.get()) != static_cast<std::uint64_t>(full_bytes)
             : TIFFVStripSize64(tiff_.get(), block_height) != static_cast<std::uint64_t>(full_bytes)) {
     return failed("strips or tiles whose size is not that of their pixels");
@@ -307,7 +311,7 @@ Result<DecodedImage> Reader::read() {
   // "m": not through a memory map, so every access goes through read_bytes with its bounds.
   tiff_.reset(TIFFClientOpenExt("image", "rm", &source_, read_bytes, write_nothing, seek_to, close_nothing, size_of,
                                 nullptr, nullptr, options.get()));
-  if (tiff_ == nullptr) return failed("no directory");
+  if (tiff_ == nullptr) return failed("its directory cannot be read");
 
   // Pages are looked at twice: first how many belong together, then their pixels. Never more than channels_max of them.
   const Result<Page> first = page();
@@ -328,11 +332,11 @@ Result<DecodedImage> Reader::read() {
     if (others) break;
     ++pages;
   }
-  if (others || !source_.message.empty()) {
+  if (others || source_.failed) {
     image.notes.push_back("of the TIFF's pages only the first " + std::to_string(pages) +
                           " were read: the next is damaged, of another shape or too many");
   }
-  source_.message.clear();
+  source_.failed = false;
   image.channel_count = first->channels * pages;
   image.samples.resize(static_cast<std::size_t>(image.pixel_count() * image.channel_count));
   if (TIFFSetDirectory(tiff_.get(), 0) == 0) return failed("its first page is gone");

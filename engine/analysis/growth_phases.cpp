@@ -102,6 +102,7 @@ GrowthPhase line_phase(std::span<const GrowthPoint> rows, bool exponential) {
   return phase;
 }
 
+/// A stretch of constant size: the plateau, and a lag.
 GrowthPhase plateau_phase(std::span<const GrowthPoint> rows) {
   const auto n = static_cast<double>(rows.size());
   double mean = 0.0, squares = 0.0, products = 0.0;
@@ -144,7 +145,15 @@ Result<GrowthPhases> growth_phases(std::span<const GrowthPoint> series) {
   GrowthPhases phases;
   phases.bic = best.bic;
   phases.relative_sd = std::sqrt(best.squares / static_cast<double>(n));
-  if (best.first > 0) phases.exponential = line_phase(series.subspan(0, best.first), true);
+  if (best.first > 0) {
+    const GrowthPhase phase = line_phase(series.subspan(0, best.first), true);
+    // An interval with 0 in it is one of a doubling time without an upper bound.
+    if (std::isfinite(phase.value) && std::isfinite(phase.interval.high)) {
+      phases.exponential = phase;
+    } else {
+      phases.lag = plateau_phase(series.subspan(0, best.first));
+    }
+  }
   if (best.second > best.first) phases.linear_radius = line_phase(series.subspan(best.first, best.second - best.first), false);
   if (best.second < n) phases.plateau = plateau_phase(series.subspan(best.second));
   return phases;

@@ -4,6 +4,7 @@
 //          of ln N in the exponential phase and the plateau; 2 (q - fit) / q in the linear one, q = sqrt N, which goes as R there: one quantity
 //          throughout, else the sums could not be compared. k: two for a line, one for a plateau, one for each change point, one for the
 //          scatter. Phases need not join: nature has no corners. The speed is then that of R itself.
+// Lag:     a first phase whose slope has 0 in its interval is no growth (one cell that has not divided yet): it is called lag.
 // Intervals: 95 %, Student's t on the line's standard error times sqrt((1 + r) / (1 - r)), r = correlation of neighbouring residuals
 //          (0..0.95): counts add up, so rows are not independent. Change points have no interval.
 // Units:   h, um.
@@ -40,6 +41,7 @@ struct GrowthPhase {
 };
 
 struct GrowthPhases {
+  std::optional<GrowthPhase> lag = {};            // value: size; the first phase where its growth cannot be told from none: then no exponential one
   std::optional<GrowthPhase> exponential = {};    // value: doubling time, h (negative: shrinking)
   std::optional<GrowthPhase> linear_radius = {};  // value: um per h
   std::optional<GrowthPhase> plateau = {};        // value: size

@@ -107,6 +107,7 @@ Result<ImageAnalysis> analyse_image(std::string_view bytes, const AnalysisOption
   if (!segmentation) return segmentation.error();
   result.segmentation = std::move(*segmentation);
   const Segmentation& found = result.segmentation;
+  if (!options.segment.keep_only.empty()) return result;  // one step was asked for: there need be no objects
   result.object_count = static_cast<std::int64_t>(found.areas_px.size());
   result.foreground_share = static_cast<double>(found.foreground_px) / static_cast<double>(found.field_px);
   result.area_mean_px = static_cast<double>(found.foreground_px) / static_cast<double>(result.object_count);

@@ -52,6 +52,7 @@ struct ImageAnalysis {
 };
 
 /// What a click on "analyse" does, and what each of its steps looked like. `bytes` must stay until it returns. Throws Stopped when asked to.
+/// With segment.keep_only: the metadata and that step alone.
 Result<ImageAnalysis> analyse_image(std::string_view bytes, const AnalysisOptions& options, StopFlag stop = nullptr);
 
 /// One channel (or the luma of RGB, by integer weights 299, 587, 114) as 8 bits. 8-bit samples stay as they are; 16-bit samples are stretched from their

@@ -35,11 +35,12 @@ class Collector {
   explicit Collector(const std::vector<LabelArea>& areas) : areas_(areas), sums_(areas.size() + 1) {}
 
   /// False when there are too many runs.
-  bool collect(const LabelImage& labels) {
+  bool collect(const LabelImage& labels, StopFlag stop) {
     const std::int64_t width = labels.width_px, height = labels.height_px;
     // Two rows with a margin of background on every side, so that the frame's edge is a border like any other.
     std::vector<std::uint32_t> above(static_cast<std::size_t>(width) + 2, 0), here = above;
     for (std::int64_t row = 0; row <= height; ++row) {
+      throw_if_stopped(stop);
       std::fill(here.begin(), here.end(), 0);
       if (row < height && !add_runs(labels, row, here)) return false;
       for (std::size_t i = 1; i < here.size(); ++i) {
@@ -200,13 +201,13 @@ void add_roughness(const LabelImage& piece, std::uint32_t number, ColonyShape& c
 
 }  // namespace
 
-Result<std::vector<Shape>> cell_shapes(const LabelImage& labels) {
+Result<std::vector<Shape>> cell_shapes(const LabelImage& labels, StopFlag stop) {
   if (const Status status = check_image(labels, "image"); !status) return status.error();
   const std::vector<LabelArea> areas = label_areas(labels);
   if (areas.empty()) return wrong(ErrorCode::kInvalid, "has no labels: there is nothing to measure");
   if (areas.size() > kLabelsMax) return wrong(ErrorCode::kLimit, "more than " + std::to_string(kLabelsMax) + " labels");
   Collector collector(areas);
-  if (!collector.collect(labels)) {
+  if (!collector.collect(labels, stop)) {
     return wrong(ErrorCode::kLimit, "the labels are in more than " + std::to_string(kRunsMax) + " runs: this is no picture of cells");
   }
   std::vector<Shape> shapes;
@@ -215,9 +216,10 @@ Result<std::vector<Shape>> cell_shapes(const LabelImage& labels) {
   return shapes;
 }
 
-Result<ColonyShape> colony_shape(const LabelImage& labels, std::int64_t gap_px) {
+Result<ColonyShape> colony_shape(const LabelImage& labels, std::int64_t gap_px, StopFlag stop) {
   Result<BinaryImage> outside = outside_of(labels, gap_px);
   if (!outside) return outside.error();
+  throw_if_stopped(stop);
   ColonyShape colony;
   BinaryImage holes = foreground_of(labels);
   for (const std::uint8_t value : holes.values) colony.covered_px += value != 0 ? 1 : 0;
@@ -229,7 +231,7 @@ Result<ColonyShape> colony_shape(const LabelImage& labels, std::int64_t gap_px) 
     colony.hole_px += holes.values[i];
   }
   colony.hole_count = number_parts(holes, 4, parts);
-  const Result<std::vector<Shape>> all = cell_shapes(labels_of(*outside, 0));
+  const Result<std::vector<Shape>> all = cell_shapes(labels_of(*outside, 0), stop);
   if (!all) return all.error();
   colony.hull_area_px = all->front().hull_area_px;
   colony.open_share = 1.0 - static_cast<double>(colony.covered_px) / colony.hull_area_px;
@@ -242,7 +244,7 @@ Result<ColonyShape> colony_shape(const LabelImage& labels, std::int64_t gap_px) 
   });
   const std::uint32_t number = largest->label;
   for (std::uint32_t& value : parts.values) value = value == number ? number : 0;
-  const Result<std::vector<Shape>> piece = cell_shapes(parts);
+  const Result<std::vector<Shape>> piece = cell_shapes(parts, stop);
   if (!piece) return piece.error();
   colony.shape = piece->front();
   colony.excess_perimeter = colony.shape.perimeter_px / colony.shape.hull_perimeter_px - 1.0;

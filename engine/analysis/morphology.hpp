@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "engine/analysis/image.hpp"
+#include "engine/base/stop.hpp"
 
 namespace colony {
 
@@ -32,7 +33,8 @@ struct Shape {
 };
 
 /// One entry a label, ascending. A label of several pieces is measured as one set.
-Result<std::vector<Shape>> cell_shapes(const LabelImage& labels);
+/// Throws Stopped.
+Result<std::vector<Shape>> cell_shapes(const LabelImage& labels, StopFlag stop = nullptr);
 
 struct ColonyShape {
   Shape shape;                   // of the largest piece, holes filled
@@ -49,7 +51,7 @@ struct ColonyShape {
   double excess_perimeter = 0.0; // perimeter / hull perimeter - 1: 0 for any convex outline, to the estimator's error
 };
 
-/// `gap_px` as in outside_of.
-Result<ColonyShape> colony_shape(const LabelImage& labels, std::int64_t gap_px = 0);
+/// `gap_px` as in outside_of. Throws Stopped.
+Result<ColonyShape> colony_shape(const LabelImage& labels, std::int64_t gap_px = 0, StopFlag stop = nullptr);
 
 }  // namespace colony

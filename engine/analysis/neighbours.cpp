@@ -72,9 +72,10 @@ Border border_of(const Pair& pair, const BorderSums& sums) {
 }
 
 /// Marks labels with a pixel beside the outside or at the frame's edge.
-std::vector<bool> at_edge(const LabelImage& labels, const BinaryImage& outside, const std::vector<LabelArea>& areas) {
+std::vector<bool> at_edge(const LabelImage& labels, const BinaryImage& outside, const std::vector<LabelArea>& areas, StopFlag stop) {
   std::vector<bool> edge(areas.size(), false);
   for (std::int64_t row = 0; row < labels.height_px; ++row) {
+    throw_if_stopped(stop);
     for (std::int64_t column = 0; column < labels.width_px; ++column) {
       const std::uint32_t label = labels.at(row, column);
       if (label == 0) continue;
@@ -105,7 +106,7 @@ StraightnessGroup group_of(const std::vector<double>& values) {
 
 }  // namespace
 
-Result<Contacts> find_contacts(const LabelImage& labels, std::int64_t gap_px) {
+Result<Contacts> find_contacts(const LabelImage& labels, std::int64_t gap_px, StopFlag stop) {
   const Result<BinaryImage> outside = outside_of(labels, gap_px);
   if (!outside) return outside.error();
   const std::vector<LabelArea> areas = label_areas(labels);
@@ -116,15 +117,17 @@ Result<Contacts> find_contacts(const LabelImage& labels, std::int64_t gap_px) {
   }
   BorderMap borders;
   for (std::int64_t row = 0; row < labels.height_px; ++row) {
+    throw_if_stopped(stop);
     scan_line(labels, labels.width_px, gap_px, [&](std::int64_t i) { return labels.index(row, i); },
               [&](std::uint32_t a, std::uint32_t b, std::int64_t twice) { borders.add(a, b, twice, 2 * row + 1); });
   }
   for (std::int64_t column = 0; column < labels.width_px; ++column) {
+    throw_if_stopped(stop);
     scan_line(labels, labels.height_px, gap_px, [&](std::int64_t i) { return labels.index(i, column); },
               [&](std::uint32_t a, std::uint32_t b, std::int64_t twice) { borders.add(a, b, 2 * column + 1, twice); });
   }
   Contacts contacts;
-  const std::vector<bool> edge = at_edge(labels, *outside, areas);
+  const std::vector<bool> edge = at_edge(labels, *outside, areas, stop);
   for (std::size_t i = 0; i < areas.size(); ++i) contacts.cells.push_back({areas[i].label, 0, !edge[i]});
   const auto cell_of = [&](std::uint32_t label) {
     return std::lower_bound(contacts.cells.begin(), contacts.cells.end(), label,

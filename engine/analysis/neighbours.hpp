@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "engine/analysis/image.hpp"
+#include "engine/base/stop.hpp"
 
 namespace colony {
 
@@ -41,7 +42,8 @@ struct Contacts {
   std::vector<Border> borders;         // by (low, high); those of kBorderEdgesMin edges and more
 };
 
-Result<Contacts> find_contacts(const LabelImage& labels, std::int64_t gap_px = 0);
+/// Throws Stopped.
+Result<Contacts> find_contacts(const LabelImage& labels, std::int64_t gap_px = 0, StopFlag stop = nullptr);
 
 inline constexpr std::uint32_t kSidesFirst = 4, kSidesLast = 9;
 /// Shares of cells with 4..9 sides where cells divide and never move: mean 6.

@@ -26,7 +26,7 @@ Spread spread_of(const std::vector<double>& values) {
 }  // namespace
 
 Result<std::vector<Ring>> radial_profile(const LabelImage& labels, const std::vector<Shape>& shapes,
-                                         const std::optional<std::vector<std::uint32_t>>& active, int ring_count) {
+                                         const std::optional<std::vector<std::uint32_t>>& active, int ring_count, StopFlag stop) {
   if (const Status status = check_image(labels, "image"); !status) return status.error();
   if (ring_count < 1 || ring_count > 200) {
     return Error{ErrorCode::kInvalid, "ring_count: must lie in 1..200", {{"ring_count", "must lie in 1..200"}}};
@@ -60,6 +60,7 @@ Result<std::vector<Ring>> radial_profile(const LabelImage& labels, const std::ve
     if (active && std::binary_search(active->begin(), active->end(), shape.label)) ++active_counts[ring];
   }
   for (std::int64_t row = 0; row < labels.height_px; ++row) {
+    throw_if_stopped(stop);
     for (std::int64_t column = 0; column < labels.width_px; ++column) {
       if (labels.at(row, column) == 0) continue;
       // Pixels beyond the farthest centre belong to no ring.

@@ -1,6 +1,7 @@
 // radial: how size, density and activity of cells change from the middle of a colony to its rim, and how cells that stand apart differ.
 // Method:  rings of equal width about the centre of all labelled pixels, up to the farthest cell centre. A cell belongs to the ring of its
-//          centre; the covered area of a ring is that of labelled pixels in it.
+//          centre; the covered area of a ring is that of labelled pixels in it. Pixels
+//          farther out than the farthest centre, the outer halves of the outermost cells, are in no ring: a ring of halves would have no density.
 // Units:   pixels.
 // Errors:  kInvalid: `ring_count` outside 1..200; cells that are not those of the image.
 // Threads: pure.
@@ -24,9 +25,9 @@ struct Ring {
   std::optional<double> active_share = {};  // none without cells, or where activity is not known
 };
 
-/// `active`: labels of the active (dividing) cells, ascending; none where it is not known.
+/// Throws Stopped. `active`: labels of the active (dividing) cells, ascending; none where it is not known.
 Result<std::vector<Ring>> radial_profile(const LabelImage& labels, const std::vector<Shape>& shapes,
-                                         const std::optional<std::vector<std::uint32_t>>& active, int ring_count);
+                                         const std::optional<std::vector<std::uint32_t>>& active, int ring_count, StopFlag stop = nullptr);
 
 /// Cells without any neighbour against the others.
 struct ApartCells {

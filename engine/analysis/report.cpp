@@ -4,25 +4,47 @@
 
 #include "engine/analysis/contour.hpp"
 #include "engine/analysis/controls.hpp"
+#include "engine/analysis/reason.hpp"
 #include "engine/base/check.hpp"
 #include "engine/base/maths.hpp"
 
 namespace colony {
 
 MeasuredLine measure_line(const Result<BinaryImage>& line, const BoxOptions& boxes, StopFlag stop) {
-  if (!line) return {{}, line.error().message};
+  if (!line) return {{}, reason_of(line.error())};
   Result<BoxDimensions> dimensions = box_dimensions(*line, boxes, stop);
-  if (!dimensions) return {{}, dimensions.error().message};
+  if (!dimensions) return {{}, reason_of(dimensions.error())};
   return {std::move(*dimensions), {}};
 }
 
-LineFindings judge_lines(const LineReport& lines, const std::vector<ControlReport>& controls) {
+std::string_view name_of(ObjectKind kind) {
+  constexpr std::string_view kNames[] = {"cells", "nuclei", "regions", "objects"};
+  return kNames[static_cast<std::size_t>(kind)];
+}
+
+std::string_view singular_of(ObjectKind kind) {
+  constexpr std::string_view kNames[] = {"cell", "nucleus", "region", "object"};
+  return kNames[static_cast<std::size_t>(kind)];
+}
+
+std::string_view name_of(Placement placement) {
+  constexpr std::string_view kNames[] = {"same_places", "touching", "spread"};
+  return kNames[static_cast<std::size_t>(placement)];
+}
+
+LineNames line_names(ObjectKind kind) {
+  if (kind == ObjectKind::kCells) return {"cell walls", "colony outline"};
+  return {"outlines of the " + std::string(name_of(kind)), "outer outline"};
+}
+
+LineFindings judge_lines(const LineReport& lines, const std::vector<ControlReport>& controls, ObjectKind kind) {
   std::vector<NamedLine> walls, outlines;
   for (const ControlReport& control : controls) {
     walls.push_back({control.name, &control.lines.walls});
     outlines.push_back({control.name, &control.lines.outline});
   }
-  return {judge_line("cell walls", lines.walls, walls), judge_line("colony outline", lines.outline, outlines)};
+  const LineNames names = line_names(kind);
+  return {judge_line(names.walls, lines.walls, walls), judge_line(names.outline, lines.outline, outlines)};
 }
 
 std::vector<std::string> sentences_of(const LineFindings& findings) {
@@ -38,22 +60,82 @@ LineReport analyse_lines(const LabelImage& labels, std::int64_t gap_px, const Bo
   return report;
 }
 
+LineReport analyse_lines_like(const LineReport& like, const LabelImage& labels, const BoxOptions& boxes, StopFlag stop) {
+  const auto count = [&](const Result<BinaryImage>& line, const MeasuredLine& beside) {
+    BoxOptions same = boxes;
+    if (line && beside.dimensions) {
+      same.sides_px.clear();
+      for (const BoxCount& box : beside.dimensions->counts) same.sides_px.push_back(box.side_px);
+      same.part = foreground_box(*line);  // the grid begins where it always does: the same set has the same counts
+    }
+    return measure_line(line, same, stop);
+  };
+  return {count(cell_walls(labels), like.walls), count(colony_outline(labels), like.outline)};
+}
+
+MeasuredLine up_to(const MeasuredLine& line, std::int64_t side_max_px) {
+  if (!line.dimensions) return line;
+  const BoxDimensions& all = *line.dimensions;
+  std::vector<BoxCount> counts;
+  for (const BoxCount& count : all.counts) {
+    if (count.side_px <= side_max_px) counts.push_back(count);
+  }
+  if (counts.size() < kSidesMin) {
+    return {{}, "boxes up to " + std::to_string(side_max_px) + " px leave " + std::to_string(counts.size()) + " sides; at least " +
+                    std::to_string(kSidesMin) + " are needed"};
+  }
+  BoxDimensions part = fit_dimensions(std::move(counts));
+  part.part = all.part;
+  part.foreground_px = all.foreground_px;
+  return {std::move(part), {}};
+}
+
+MatchedControls matched_controls(const LabelImage& labels, const LineReport& lines, Seed seed, const BoxOptions& boxes, StopFlag stop) {
+  const std::vector<LabelArea> areas = label_areas(labels);
+  const Hull hull = hull_of(labels);
+  MatchedControls out;
+  std::uint64_t covered = 0;
+  for (const LabelArea& area : areas) covered += area.area_px;
+  if (hull.area_px > 0) out.cover = static_cast<double>(covered) / static_cast<double>(hull.area_px);
+  const bool is_tiled = out.cover >= kTilingCover;
+  const auto add = [&](const char* name, const Result<LabelImage>& control) {
+    const MeasuredLine none{{}, control ? std::string() : reason_of(control.error())};
+    out.reports.push_back({name, control ? analyse_lines_like(lines, *control, boxes, stop) : LineReport{none, none},
+                           is_tiled ? Placement::kTouching : Placement::kSpread});
+  };
+  add("hexagonal", is_tiled ? hexagonal_control(areas, labels.um_per_px) : hexagonal_control(areas, hull, labels.um_per_px));
+  add("random_discs", is_tiled ? random_disc_control(areas, seed, labels.um_per_px) : random_disc_control(areas, hull, seed, labels.um_per_px));
+  return out;
+}
+
+std::vector<std::string> control_sentences(ObjectKind kind, double cover) {
+  const std::string names(name_of(kind));
+  const std::string share = "The " + names + " cover " + decimals(cover) + " of their convex hull";
+  if (cover >= kTilingCover) {
+    return {share + ": they tile it, so the controls hexagonal and random_discs are as many discs of their size packed together."};
+  }
+  return {share + ": they stand apart, so the controls hexagonal and random_discs are as many discs of their size spread over this hull, in the same "
+                  "frame and counted with the same boxes.",
+          "What is counted as walls are the outlines of single " + names + ", hardly ever a border that two " +
+              (kind == ObjectKind::kCells ? "cells" : "of them") + " share."};
+}
+
 Result<LabelReport> analyse_labels(const LabelInput& input, StopFlag stop) {
   CHECK(input.labels != nullptr);
   if (const Status status = check_box_options(input.boxes); !status) return status.error();
   const LabelImage& labels = *input.labels;
   LabelReport report;
   report.um_per_px = labels.um_per_px;
-  Result<std::vector<Shape>> shapes = cell_shapes(labels);
+  Result<std::vector<Shape>> shapes = cell_shapes(labels, stop);
   if (!shapes) return shapes.error();
   report.shapes = std::move(*shapes);
-  Result<Contacts> contacts = find_contacts(labels, input.gap_px);
+  Result<Contacts> contacts = find_contacts(labels, input.gap_px, stop);
   if (!contacts) return contacts.error();
   report.contacts = std::move(*contacts);
-  const Result<ColonyShape> colony = colony_shape(labels, input.gap_px);
+  const Result<ColonyShape> colony = colony_shape(labels, input.gap_px, stop);
   if (!colony) return colony.error();
   report.colony = *colony;
-  Result<std::vector<Ring>> rings = radial_profile(labels, report.shapes, input.active, input.ring_count);
+  Result<std::vector<Ring>> rings = radial_profile(labels, report.shapes, input.active, input.ring_count, stop);
   if (!rings) return rings.error();
   report.rings = std::move(*rings);
   report.sides = side_statistics(report.contacts);
@@ -62,24 +144,26 @@ Result<LabelReport> analyse_labels(const LabelInput& input, StopFlag stop) {
   report.cell_count = report.shapes.size();
   report.cell_area_mean_px = static_cast<double>(report.colony.covered_px) / static_cast<double>(report.cell_count);
   report.px_per_cell_diameter = 2.0 * std::sqrt(report.cell_area_mean_px / maths::kPi);
+  Result<ClosedSides> closed = closed_sides(labels, report.cell_area_mean_px, input.gap_px, stop);
+  if (!closed) return closed.error();
+  report.closed_sides = std::move(*closed);
 
   report.lines = analyse_lines(labels, input.gap_px, input.boxes, stop);
   if (input.without_noise != nullptr) {
-    report.controls.push_back({"without_noise", analyse_lines(*input.without_noise, 0, input.boxes, stop)});
+    report.controls.push_back({"without_noise", analyse_lines_like(report.lines, *input.without_noise, input.boxes, stop), Placement::kSamePlaces});
   }
-  const std::vector<LabelArea> areas = label_areas(labels);
-  const auto add_control = [&](const std::string& name, const Result<LabelImage>& control) {
-    if (control) {
-      report.controls.push_back({name, analyse_lines(*control, 0, input.boxes, stop)});
-    } else {
-      report.controls.push_back({name, {{{}, control.error().message}, {{}, control.error().message}}});
-    }
-  };
-  add_control("hexagonal", hexagonal_control(areas, labels.um_per_px));
-  add_control("random_discs", random_disc_control(areas, input.control_seed, labels.um_per_px));
+  MatchedControls matched = matched_controls(labels, report.lines, input.control_seed, input.boxes, stop);
+  for (ControlReport& control : matched.reports) report.controls.push_back(std::move(control));
+  report.object_cover = matched.cover;
+  report.objects = input.objects;
 
-  report.findings = judge_lines(report.lines, report.controls);
+  report.findings = judge_lines(report.lines, report.controls, input.objects);
   report.verdict = sentences_of(report.findings);
+  // Sides are those of cells: what nuclei or regions touch says nothing of Gibson's table.
+  if (input.objects == ObjectKind::kCells) {
+    for (std::string& sentence : judge_sides(report.sides, report.closed_sides)) report.verdict.push_back(std::move(sentence));
+  }
+  for (std::string& sentence : control_sentences(input.objects, matched.cover)) report.verdict.push_back(std::move(sentence));
   return report;
 }
 

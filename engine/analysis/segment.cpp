@@ -190,6 +190,8 @@ Objects objects_at(const GreyImage& signal, int threshold, Pipeline pipeline, co
 class Steps {
  public:
   Steps(const SegmentOptions& options, std::vector<StepImage>& steps) : options_(options), steps_(steps) {}
+  /// The one step that was asked for is there: nothing else is.
+  bool is_complete() const { return !options_.keep_only.empty() && !steps_.empty(); }
   bool wants(const std::string& name) const {
     return options_.keep_steps && (options_.keep_only.empty() || options_.keep_only == name);
   }
@@ -221,7 +223,7 @@ GreyImage evened(const GreyImage& image, const SegmentOptions& options, Steps& s
   return even;
 }
 
-/// What is thresholded: light where there is something.
+/// What is thresholded: light where there is something. Where the steps are complete before, any image.
 GreyImage signal_of(const GreyImage& image, const SegmentOptions& options, Segmentation& result, Steps& steps) {
   if (result.pipeline == Pipeline::kPhase) {
     GreyImage signal = local_deviation(evened(image, options, steps), options.window_radius_px);
@@ -231,6 +233,7 @@ GreyImage signal_of(const GreyImage& image, const SegmentOptions& options, Segme
   const bool dark = result.foreground == Foreground::kDark;
   const GreyImage light = dark ? inverted(image) : image;
   if (dark) steps.add("inverted", "turned so that the foreground is light", light);
+  if (steps.is_complete()) return light;
   result.background_reach_px = options.background_reach_px.value_or(
       std::max(std::min(image.width_px, image.height_px) / 4, kBackgroundReachMin_px));
   const GreyImage ground = background(light, result.background_reach_px);
@@ -238,8 +241,10 @@ GreyImage signal_of(const GreyImage& image, const SegmentOptions& options, Segme
             "what the picture would be without its objects: opening with a square of " +
                 std::to_string(result.background_reach_px) + " px, smoothed",
             ground);
+  if (steps.is_complete()) return light;
   const GreyImage corrected = subtracted(light, ground);
   steps.add("corrected", "the picture less its background", corrected);
+  if (steps.is_complete()) return light;
   GreyImage signal = square_root(smoothed(evened(corrected, options, steps)));
   steps.add("signal", "smoothed 3 x 3, square root: what is thresholded", signal);
   return signal;
@@ -248,7 +253,7 @@ GreyImage signal_of(const GreyImage& image, const SegmentOptions& options, Segme
 /// Nine levels about the answer's own; `objects` makes those of the others.
 template <class MakeObjects>
 void sweep_levels(const SegmentOptions& options, StopFlag stop, Segmentation& result, const MakeObjects& make_objects) {
-  if (!options.sweep) return;
+  if (!options.sweep || !options.keep_only.empty()) return;
   if (options.at_threshold) options.at_threshold({result.threshold, result.pipeline, result.mask, result.labels});
   for (std::int64_t k = -kSweepSide; k <= kSweepSide; ++k) {
     const std::int64_t at = result.threshold + k * kSweepStep;
@@ -302,6 +307,7 @@ Result<Segmentation> segment(const GreyImage& image, const SegmentOptions& optio
   result.foreground_reason = "asked for";
   Steps steps(options, result.steps);
   steps.add("grey", "the channel that is analysed, as 8 bits", image);
+  if (steps.is_complete()) return result;
   result.field_px = static_cast<std::int64_t>(image.values.size());
   result.threshold_given = options.threshold.has_value();
 
@@ -316,6 +322,7 @@ Result<Segmentation> segment(const GreyImage& image, const SegmentOptions& optio
     const bool dark = result.foreground == Foreground::kDark;
     result.mask = dark ? inverted(light) : std::move(light);
     steps.add("threshold", "the ink: what is measured, as it is", result.mask);
+    if (steps.is_complete()) return result;
     const Pieces found = pieces_of(result.mask);
     result.area_min_px = 1;
     result.labels = renumbered(found.labels, 1, &result.areas_px);
@@ -336,8 +343,9 @@ Result<Segmentation> segment(const GreyImage& image, const SegmentOptions& optio
       result.foreground_reason = foreground_reason(look, is_dark);
     }
     const GreyImage signal = signal_of(image, options, result, steps);
+    if (steps.is_complete()) return result;
     // Where a window is constant the picture was clipped or empty: such pixels say nothing about where noise ends and cells begin.
-    const int level = options.threshold.value_or(otsu(signal, result.pipeline == Pipeline::kPhase ? 37 : 0));
+    const int level = options.threshold.value_or(otsu(signal, result.pipeline == Pipeline::kPhase ? kOneLevelOfDeviation : 0));
     if (level < 0) return wrong("image", "after the background is taken away nothing is left in it");
     result.threshold = level;
     throw_if_stopped(stop);
@@ -355,6 +363,7 @@ Result<Segmentation> segment(const GreyImage& image, const SegmentOptions& optio
       steps.add("distance", "distance to the background, by which touching objects are parted",
                 shown(objects.distance));
     }
+    if (steps.is_complete()) return result;
     result.area_min_px = objects.area_min_px;
     result.mask = std::move(objects.mask);
     result.labels = std::move(objects.labels);
@@ -362,12 +371,14 @@ Result<Segmentation> segment(const GreyImage& image, const SegmentOptions& optio
     sweep_levels(options, stop, result, [&](int at) { return objects_at(signal, at, result.pipeline, options); });
   }
   for (const std::int64_t area : result.areas_px) result.foreground_px += area;
+  // A threshold that nobody gave is not what is wrong.
+  const std::string field = result.threshold_given ? "threshold" : "image";
   if (result.foreground_px == 0) {
-    return wrong("threshold", "nothing is left in the foreground at level " + std::to_string(result.threshold) +
+    return wrong(field, "nothing is left in the foreground at level " + std::to_string(result.threshold) +
                                   ": give another threshold, foreground or pipeline");
   }
   if (result.foreground_px == result.field_px) {
-    return wrong("threshold", "everything is foreground at level " + std::to_string(result.threshold) +
+    return wrong(field, "everything is foreground at level " + std::to_string(result.threshold) +
                                   ": give another threshold, foreground or pipeline");
   }
   if (steps.wants("overlay")) steps.add(overlay(image, result.labels));

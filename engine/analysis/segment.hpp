@@ -57,7 +57,8 @@ struct SegmentOptions {
   bool clahe = false;  // even the local contrast first
   bool split = true;   // nuclei: part touching objects
   bool keep_steps = true;
-  std::string keep_only = {};  // keep only the step of this name; empty: all
+  /// Keep only the step of this name, and end there: nothing else of the result is then made, and no sweep. Empty: all.
+  std::string keep_only = {};
   bool sweep = true;           // nine levels: most of the time
   ThresholdVisitor at_threshold = {};  // called for every level of the sweep, the answer's own first, then ascending
 };

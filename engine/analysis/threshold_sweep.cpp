@@ -51,10 +51,11 @@ void ThresholdLines::add(const ThresholdView& view) {
   sweep_.rows.push_back(std::move(row));
 }
 
-ThresholdSweep ThresholdLines::finish() {
+ThresholdSweep ThresholdLines::finish(ObjectKind kind) {
+  const LineNames names = line_names(kind);
   std::sort(sweep_.rows.begin(), sweep_.rows.end(), [](const ThresholdRow& a, const ThresholdRow& b) { return a.threshold < b.threshold; });
   if (!sweep_.rows.empty()) {
-    sweep_.sentences = {hanging_text("cell walls", sweep_, &ThresholdRow::walls), hanging_text("colony outline", sweep_, &ThresholdRow::outline)};
+    sweep_.sentences = {hanging_text(names.walls, sweep_, &ThresholdRow::walls), hanging_text(names.outline, sweep_, &ThresholdRow::outline)};
   }
   return std::exchange(sweep_, {});
 }

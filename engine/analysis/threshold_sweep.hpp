@@ -28,7 +28,7 @@ class ThresholdLines {
  public:
   explicit ThresholdLines(const BoxOptions& boxes, StopFlag stop = nullptr) : boxes_(boxes), stop_(stop) {}
   void add(const ThresholdView& view);
-  ThresholdSweep finish();
+  ThresholdSweep finish(ObjectKind kind = ObjectKind::kCells);
 
  private:
   BoxOptions boxes_;

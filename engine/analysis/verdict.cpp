@@ -112,17 +112,26 @@ std::string with_error(const Dimension& dimension) {
   return decimals(dimension.value, 3) + " +- " + decimals(dimension.standard_error, 3);
 }
 
-SlopeCourse slope_course(const BoxDimensions& found) {
+std::vector<LocalSlope> windowed_slopes(const BoxDimensions& found) {
   std::vector<double> log_side, log_count;
   for (const BoxCount& count : found.counts) {
     log_side.push_back(maths::log(static_cast<double>(count.side_px)));
     log_count.push_back(maths::log(count.count_mean));
   }
   const std::size_t window = std::min(kSlopeWindow, log_side.size());
-  std::vector<double> slopes;
+  std::vector<LocalSlope> slopes;
   for (std::size_t i = 0; i + window <= log_side.size(); ++i) {
-    slopes.push_back(-fit_line({log_side.data() + i, window}, {log_count.data() + i, window}).slope);
+    double mean = 0.0;
+    for (std::size_t k = i; k < i + window; ++k) mean += log_side[k] / static_cast<double>(window);
+    slopes.push_back({maths::exp(mean), -fit_line({log_side.data() + i, window}, {log_count.data() + i, window}).slope});
   }
+  return slopes;
+}
+
+SlopeCourse slope_course(const BoxDimensions& found) {
+  std::vector<double> slopes;
+  for (const LocalSlope& slope : windowed_slopes(found)) slopes.push_back(slope.dimension);
+  const std::size_t window = std::min(kSlopeWindow, found.counts.size());
   SlopeCourse course;
   course.first = slopes.front();
   course.last = slopes.back();
@@ -135,8 +144,8 @@ SlopeCourse slope_course(const BoxDimensions& found) {
       low = std::min(low, slopes[k]);
       high = std::max(high, slopes[k]);
       if (high - low > kPlateauBand) break;
-      const double decades = (log_side[k + window - 1] - log_side[i]) / maths::log(10.0);
-      course.plateau_decades = std::max(course.plateau_decades, decades);
+      const auto side = [&](std::size_t at) { return static_cast<double>(found.counts[at].side_px); };
+      course.plateau_decades = std::max(course.plateau_decades, decades_between(side(i), side(k + window - 1)));
     }
   }
   return course;
@@ -180,7 +189,9 @@ LineFinding judge_line(const std::string& name, const MeasuredLine& line, std::s
   }
   if (!unlike.empty()) {
     result.sentences.push_back("The control" + std::string(unlike.size() > 1 ? "s " : " ") + joined(unlike) +
-                               (unlike.size() > 1 ? " differ" : " differs") + " by more than errors and bias: there number and size of the cells do not explain the value.");
+                               (unlike.size() > 1 ? " differ" : " differs") + " by more than errors and bias: " +
+                               (alike.empty() ? "number, size and cover of what is counted do not explain the value."
+                                              : "with number, size and cover alike the value still hangs on how things lie."));
   }
   if (alike.empty() && unlike.empty()) {
     result.sentences.push_back("No control could be counted: nothing shows what smooth cells of this number and size would give for the " + name + ".");

@@ -44,6 +44,9 @@ struct SlopeCourse {
   double plateau_decades = 0.0;           // longest range of sides whose windows all lie within kPlateauBand of each other
 };
 
+/// Slopes of lines through kSlopeWindow neighbouring sides (through all, where there are fewer), each at the geometric mean of its sides.
+std::vector<LocalSlope> windowed_slopes(const BoxDimensions& found);
+
 /// At least kSlopeWindow sides, else one window of all.
 SlopeCourse slope_course(const BoxDimensions& found);
 

@@ -10,11 +10,13 @@ namespace colony {
 namespace {
 
 constexpr double kBarShareMax = 0.2;  // of the picture's width
-constexpr std::int64_t kWidthPerTextScale_px = 512;
+// Letters of 10 x 14 pixels wherever the longest legend has room for them; it takes 400 then.
+constexpr std::int64_t kReadableWidth_px = 480;
+constexpr std::int64_t kWidthPerTextScale_px = 400;
 
 /// Pixels a dot of the font, and the unit of every distance here.
 std::int64_t unit_px(const Picture& picture) {
-  return std::max<std::int64_t>(1, picture.width_px / kWidthPerTextScale_px);
+  return picture.width_px < kReadableWidth_px ? 1 : std::max<std::int64_t>(2, picture.width_px / kWidthPerTextScale_px);
 }
 
 void draw_haloed_text(Picture& picture, std::int64_t row, std::int64_t column, std::string_view text, Ink ink) {

@@ -87,6 +87,28 @@ NoiseLimits ColumnScan::noise_limits(const Column& column, double low_um, double
   return {gx * gy * gz, factor_slope_.x() * gy * gz + gx * factor_slope_.y() * gz + gx * gy * factor_slope_.z()};
 }
 
+kernel::TopBody ColumnScan::prepared() const {
+  kernel::TopBody out{};
+  const NoiseParams& noise = body_.noise();
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) out.to_unit[3 * i + j] = body_.to_unit()(i, j);
+    out.centre_um[i] = body_.centre_um()[i];
+    out.step[i] = step_[i];
+    out.noise_offset[i] = body_.noise_offset()[i];
+    out.rate[i] = rate_[i];
+    out.factor_slope[i] = factor_slope_[i];
+  }
+  out.step_squared = step_squared_;
+  out.amplitude = noise.amplitude;
+  out.frequency = noise.frequency;
+  out.phase = noise.phase;
+  out.amplitude_ratio = kAmplitudeRatio;
+  out.frequency_ratio = kFrequencyRatio;
+  out.noise_bound = body_.noise_bound();
+  out.step_min_um = kScanStepMin_um;
+  return out;
+}
+
 double ColumnScan::top_um(double x_um, double y_um, double floor_um) const {
   // On the column the smooth field is the parabola peak - |step|^2 (z - middle)^2.
   const Column column(body_, step_, x_um, y_um);

@@ -10,6 +10,7 @@
 // Errors:  none.      Threads: pure.
 #pragma once
 
+#include "engine/picture/top_kernel.hpp"
 #include "engine/shape/body.hpp"
 
 namespace colony {
@@ -30,7 +31,7 @@ struct NoiseLimits {
 class Column {
  public:
   Column(const Body& body, const Vec3& step, double x_um, double y_um)
-      : unit_(body.to_unit() * Vec3(x_um - body.centre_um().x(), y_um - body.centre_um().y(), -body.centre_um().z())),
+      : unit_(unit_at(body, x_um - body.centre_um().x(), y_um - body.centre_um().y(), -body.centre_um().z())),
         step_(step),
         noise_at_(unit_ + body.noise_offset()),
         noise_(body.noise()) {}
@@ -42,6 +43,13 @@ class Column {
   Vec3 noise_at(double z_um) const { return noise_at_ + step_ * z_um; }
 
  private:
+  /// Sums of three from the left, as in the vector kernel; the library's product adds the last row up in another order.
+  static Vec3 unit_at(const Body& body, double x_um, double y_um, double z_um) {
+    const Mat3& m = body.to_unit();
+    const auto row = [&](int i) { return m(i, 0) * x_um + m(i, 1) * y_um + m(i, 2) * z_um; };
+    return {row(0), row(1), row(2)};
+  }
+
   Vec3 unit_;
   Vec3 step_;
   Vec3 noise_at_;
@@ -55,6 +63,9 @@ class ColumnScan {
 
   /// The highest z > floor_um with f >= 0 in the column (x, y), or floor_um if there is none.
   double top_um(double x_um, double y_um, double floor_um) const;
+
+  /// The same for columns side by side (top_kernel.hpp).
+  kernel::TopBody prepared() const;
 
   Column column(double x_um, double y_um) const { return Column(body_, step_, x_um, y_um); }
   /// Limits of the noise for z in [low_um, high_um] of the column.

@@ -31,15 +31,16 @@ std::unique_ptr<spng_ctx, FreeContext> png_context(const Picture& picture) {
   return context;
 }
 
-/// Where the bytes go must have been said before.
-void set_header(spng_ctx* context, const Picture& picture) {
+/// Where the bytes go must have been said before. `is_srgb`: colours for the eye; the values of a measured picture are none, and say nothing of a
+/// transfer function.
+void set_header(spng_ctx* context, const Picture& picture, bool is_srgb) {
   spng_ihdr header{};
   header.width = static_cast<std::uint32_t>(picture.width_px);
   header.height = static_cast<std::uint32_t>(picture.height_px);
   header.bit_depth = 8;
   header.color_type = SPNG_COLOR_TYPE_TRUECOLOR;
   CHECK(spng_set_ihdr(context, &header) == 0);
-  CHECK(spng_set_srgb(context, kPerceptualIntent) == 0);
+  if (is_srgb) CHECK(spng_set_srgb(context, kPerceptualIntent) == 0);
 
   // A pixel below half a nanometre or above a metre cannot be said in whole pixels per metre: then the chunk is left
   // out.
@@ -73,11 +74,11 @@ int hand_over(spng_ctx*, void* user, void* bytes, std::size_t size) {
 
 }  // namespace
 
-std::string encode_png(const Picture& picture) {
+std::string encode_png(const Picture& picture, bool is_srgb) {
   CHECK(picture.rgb.size() == static_cast<std::size_t>(3 * picture.width_px * picture.height_px));
   const auto context = png_context(picture);
   CHECK(spng_set_option(context.get(), SPNG_ENCODE_TO_BUFFER, 1) == 0);
-  set_header(context.get(), picture);
+  set_header(context.get(), picture, is_srgb);
   CHECK(spng_encode_image(context.get(), picture.rgb.data(), picture.rgb.size(), SPNG_FMT_PNG, SPNG_ENCODE_FINALIZE) ==
         0);
   std::size_t size = 0;
@@ -95,7 +96,7 @@ Status render_png(const Colony& colony, const Params& params, const PictureSpec&
     if (!context) {
       context = png_context(strip);
       CHECK(spng_set_png_stream(context.get(), hand_over, &hand) == 0);
-      set_header(context.get(), strip);
+      set_header(context.get(), strip, spec.style == PictureStyle::kShaded);
       const int status =
           spng_encode_image(context.get(), nullptr, 0, SPNG_FMT_PNG, SPNG_ENCODE_PROGRESSIVE | SPNG_ENCODE_FINALIZE);
       if (hand.thrown) std::rethrow_exception(hand.thrown);

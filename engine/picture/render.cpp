@@ -14,9 +14,11 @@
 namespace colony {
 namespace {
 
-// The golden ratio's share of 2^24, made odd, and its inverse modulo 2^24.
-constexpr std::uint32_t kLabelFactor = 0x9E3779;
-constexpr std::uint32_t kLabelInverse = 0xB382C9;
+// The golden ratio's share of kLabelColours, without a factor in common, and its inverse.
+constexpr std::uint64_t kLabelFactor = 9'072'779;
+constexpr std::uint64_t kLabelInverse = 13'006'627;
+static_assert(kLabelFactor * kLabelInverse % kLabelColours == 1);
+constexpr std::uint32_t kLowBits = 7;  // of each of three channels
 constexpr double kMarginShare = 0.05;
 constexpr double kEmptySide_um = 100.0;
 constexpr double kUmPerPxMin = 1e-3;
@@ -195,7 +197,28 @@ Result<Picture> render(const Colony& colony, const Params& params, const Picture
   return render(colony, params, spec, Effort{1, stop});
 }
 
-std::uint32_t label_colour(CellId id) { return id.value * kLabelFactor & (kLabelColours - 1); }
-CellId label_of_colour(std::uint32_t rgb) { return CellId{rgb * kLabelInverse & (kLabelColours - 1)}; }
+// A bright colour's number: its three highest bits, 1..7 (less 1), then the low bits of red, green and blue.
+std::uint32_t label_colour(CellId id) {
+  if (id.value == 0) return 0;
+  const auto number = static_cast<std::uint32_t>(id.value * kLabelFactor % kLabelColours);
+  const std::uint32_t high = (number >> 3 * kLowBits) + 1;
+  std::uint32_t rgb = 0;
+  for (std::uint32_t channel = 0; channel < 3; ++channel) {
+    rgb |= ((high >> channel & 1U) << kLowBits | (number >> channel * kLowBits & 127U)) << 8 * channel;
+  }
+  return rgb;
+}
+
+CellId label_of_colour(std::uint32_t rgb) {
+  std::uint32_t high = 0, low = 0;
+  for (std::uint32_t channel = 0; channel < 3; ++channel) {
+    const std::uint32_t value = rgb >> 8 * channel & 255U;
+    high |= value >> kLowBits << channel;
+    low |= (value & 127U) << channel * kLowBits;
+  }
+  if (high == 0) return CellId{0};
+  const std::uint64_t number = std::uint64_t{high - 1} << 3 * kLowBits | low;
+  return CellId{static_cast<std::uint32_t>(number * kLabelInverse % kLabelColours)};
+}
 
 }  // namespace colony

@@ -64,16 +64,19 @@ Result<Picture> render(const Colony& colony, const Params& params, const Picture
 Status render_strips(const Colony& colony, const Params& params, const PictureSpec& spec, const Effort& effort,
                      const std::function<void(const Picture& strip)>& take);
 
-/// The same picture as PNG bytes, handed over piece by piece, in order.
+/// The same picture as PNG bytes, handed over piece by piece, in order. `shaded` is marked as sRGB; the others are not: brightfield and phase hold
+/// shares of light, linear (255 is all of it), which no viewer may convert, contours and labels hold no colours but codes.
 Status render_png(const Colony& colony, const Params& params, const PictureSpec& spec, const Effort& effort,
                   const std::function<void(std::string_view bytes)>& take);
 
-/// PNG bytes of a picture, with its physical pixel size (pHYs).
-std::string encode_png(const Picture& picture);
+/// PNG bytes of a picture, with its physical pixel size (pHYs). `is_srgb` as render_png decides it by the style.
+std::string encode_png(const Picture& picture, bool is_srgb = true);
 
-/// `labels`: a cell's colour is its id times an odd number modulo 2^24 (red the highest byte): neighbours by id differ,
-/// and each colour is one id. Background is black, id 0.
-inline constexpr std::uint32_t kLabelColours = 1U << 24;
+/// `labels`: colours with a channel of at least 128, so that none is lost on the black background, are numbered, and a cell has that of its id
+/// times 9,072,779 modulo kLabelColours: neighbours by id differ, and each colour is one id. Number n of the colour (red the highest byte): its three
+/// highest bits (red 4, green 2, blue 1) less 1, then the seven low bits each of red, green and blue. Back: n times 13,006,627, modulo the same;
+/// any darker colour is background, id 0.
+inline constexpr std::uint32_t kLabelColours = 7U << 21;
 std::uint32_t label_colour(CellId id);
 CellId label_of_colour(std::uint32_t rgb);
 

@@ -1,6 +1,7 @@
 #include "engine/picture/top_view.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "engine/base/check.hpp"
@@ -22,17 +23,25 @@ void draw_body(TopView& view, RowRange band, CellId id, const Body& body) {
   const Box box = body.box();
   const Span columns = columns_of(box, frame);
   const Span rows = rows_of(box, frame, band);
-  const ColumnScan scan(body);
-  for (std::int64_t row = rows.begin; row < rows.end; ++row) {
-    const double y_um = frame.y_um(row);
-    for (std::int64_t column = columns.begin; column < columns.end; ++column) {
-      const std::size_t at = view.index(row, column);
-      // Ids come in ascending order and only a greater height replaces: a tie stays with the lower id.
-      const double floor_um = static_cast<double>(view.height_um[at]);
-      const float top_um = static_cast<float>(scan.top_um(frame.x_um(column), y_um, floor_um));
-      if (!(top_um > view.height_um[at])) continue;
-      view.height_um[at] = top_um;
-      view.owner[at] = id.value;
+  const kernel::TopBody prepared = ColumnScan(body).prepared();
+  std::array<double, kernel::kTopRun> x_um{}, floor_um{}, top_um{};
+  constexpr auto kRun = static_cast<std::int64_t>(kernel::kTopRun);
+  for (std::int64_t first = columns.begin; first < columns.end; first += kRun) {
+    const auto count = static_cast<std::size_t>(std::min(kRun, columns.end - first));
+    // What a vector holds beyond the last column is a copy of it.
+    for (std::size_t i = 0; i < kernel::kTopRun; ++i) x_um[i] = frame.x_um(first + static_cast<std::int64_t>(std::min(i, count - 1)));
+    for (std::int64_t row = rows.begin; row < rows.end; ++row) {
+      float* const height_um = view.height_um.data() + view.index(row, first);
+      std::uint32_t* const owner = view.owner.data() + view.index(row, first);
+      for (std::size_t i = 0; i < kernel::kTopRun; ++i) floor_um[i] = static_cast<double>(height_um[std::min(i, count - 1)]);
+      kernel::column_tops(prepared, x_um.data(), frame.y_um(row), floor_um.data(), count, top_um.data());
+      for (std::size_t i = 0; i < count; ++i) {
+        // Ids come in ascending order and only a greater height replaces: a tie stays with the lower id.
+        const auto top = static_cast<float>(top_um[i]);
+        if (!(top > height_um[i])) continue;
+        height_um[i] = top;
+        owner[i] = id.value;
+      }
     }
   }
 }

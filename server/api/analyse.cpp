@@ -4,6 +4,7 @@
 
 #include "engine/analysis/contour.hpp"
 #include "engine/analysis/controls.hpp"
+#include "engine/analysis/reason.hpp"
 #include "engine/base/check.hpp"
 #include "server/api/codec_report.hpp"
 
@@ -31,16 +32,19 @@ AnalysisOptions engine_options(const ImageOptions& options) {
   out.segment.foreground = options.foreground;
   out.segment.threshold = options.threshold;
   out.segment.clahe = options.clahe;
+  out.segment.split = options.split;
+  out.segment.area_min_px = options.area_min_px;
+  out.segment.hole_max_px = options.hole_max_px;
+  out.segment.background_reach_px = options.background_reach_px;
+  out.segment.window_radius_px = options.window_radius_px;
   return out;
 }
 
-void add_control(PictureMeasurement& out, const char* name, const Result<LabelImage>& control, const BoxOptions& boxes,
-                 StopFlag stop) {
-  if (control) {
-    out.controls.push_back({name, analyse_lines(*control, 0, boxes, stop)});
-  } else {
-    const MeasuredLine none{{}, control.error().message};
-    out.controls.push_back({name, {none, none}});
+ObjectKind objects_of(const Segmentation& found) {
+  switch (found.pipeline) {
+    case Pipeline::kContours: return ObjectKind::kCells;
+    case Pipeline::kPhase: return ObjectKind::kRegions;
+    default: return found.pipeline_given && !found.dish_found ? ObjectKind::kNuclei : ObjectKind::kObjects;
   }
 }
 
@@ -56,9 +60,9 @@ Status measure_ink(PictureMeasurement& out, const BoxOptions& boxes, StopFlag st
   out.outline = *outline;
   out.lines = {measure_line(ink, boxes, stop), measure_line(*outline, boxes, stop)};
   out.reason = "drawn lines: their cells are known by the areas that the ink encloses, not by their shapes";
-  const std::vector<LabelArea> areas = label_areas(out.cells);
-  add_control(out, "hexagonal", hexagonal_control(areas), boxes, stop);
-  add_control(out, "random_discs", random_disc_control(areas, kControlSeed), boxes, stop);
+  MatchedControls matched = matched_controls(out.cells, out.lines, kControlSeed, boxes, stop);
+  out.controls = std::move(matched.reports);
+  out.object_cover = matched.cover;
   out.verdict.push_back("The ink itself was counted as cell walls: lines thicker than one pixel raise the counts of the smallest boxes.");
   return Ok{};
 }
@@ -74,20 +78,24 @@ Status measure_objects(PictureMeasurement& out, const BoxOptions& boxes, StopFla
   out.outline = std::move(*outline);
   LabelInput input;
   input.labels = &out.cells;
+  input.objects = out.objects;
   input.control_seed = kControlSeed;
   input.boxes = boxes;
   auto report = analyse_labels(input, stop);
   if (report) {
     out.lines = report->lines;
     out.controls = report->controls;
+    out.object_cover = report->object_cover;
     out.report = std::move(*report);
   } else {
-    out.reason = report.error().message;
+    out.reason = reason_of(report.error());
     out.lines = {{{}, out.reason}, {{}, out.reason}};
   }
   if (out.analysis.segmentation.pipeline == Pipeline::kNuclei) {
-    out.verdict.push_back("The objects of this picture are what is stained or printed, nuclei if the stain is one: their borders are not "
-                          "borders of cells.");
+    out.verdict.push_back(out.objects == ObjectKind::kNuclei
+                              ? "The objects of this picture were taken for nuclei, as asked for: their borders are not borders of cells."
+                              : "The objects of this picture are what is stained or printed, nuclei if the stain is one, colonies in a dish: their "
+                                "borders are not borders of cells.");
   } else {
     out.verdict.push_back("The objects of this picture are regions of cells: cells that touch count as one.");
   }
@@ -102,7 +110,12 @@ Json encode_image_options(const ImageOptions& options) {
           {"pipeline", kPipelines[static_cast<int>(options.pipeline)]},
           {"foreground", kForegrounds[static_cast<int>(options.foreground)]},
           {"threshold", options.threshold ? Json(*options.threshold) : Json(nullptr)},
-          {"clahe", options.clahe}};
+          {"clahe", options.clahe},
+          {"split", options.split},
+          {"area_min_px", options.area_min_px ? Json(*options.area_min_px) : Json(nullptr)},
+          {"hole_max_px", options.hole_max_px ? Json(*options.hole_max_px) : Json(nullptr)},
+          {"background_reach_px", options.background_reach_px ? Json(*options.background_reach_px) : Json(nullptr)},
+          {"window_radius_px", options.window_radius_px}};
 }
 
 ImageOptions decode_image_options(const std::string& json) {
@@ -114,6 +127,16 @@ ImageOptions decode_image_options(const std::string& json) {
   options.foreground = enum_from<Foreground>(kForegrounds, stored["foreground"].get<std::string>());
   if (!stored["threshold"].is_null()) options.threshold = stored["threshold"].get<int>();
   options.clahe = stored["clahe"].get<bool>();
+  // What an older program stored has none of the following.
+  options.split = stored.value("split", options.split);
+  options.window_radius_px = stored.value("window_radius_px", options.window_radius_px);
+  const auto whole = [&](const char* name) -> std::optional<std::int64_t> {
+    if (!stored.contains(name) || stored[name].is_null()) return std::nullopt;
+    return stored[name].get<std::int64_t>();
+  };
+  options.area_min_px = whole("area_min_px");
+  options.hole_max_px = whole("hole_max_px");
+  options.background_reach_px = whole("background_reach_px");
   return options;
 }
 
@@ -157,21 +180,24 @@ Result<PictureMeasurement> measure_picture(std::string_view bytes, const ImageOp
   auto analysis = analyse_image(bytes, wanted, effort.stop);
   if (!analysis) return analysis.error();
   PictureMeasurement out;
-  out.sweep = sweep.finish();
   out.analysis = std::move(*analysis);
+  out.objects = objects_of(out.analysis.segmentation);
+  out.sweep = sweep.finish(out.objects);
   for (StepImage& step : out.analysis.segmentation.steps) step.values = {};  // only the names are told
   const bool is_ink = out.analysis.segmentation.pipeline == Pipeline::kContours;
   const Status measured = is_ink ? measure_ink(out, boxes, effort.stop) : measure_objects(out, boxes, effort.stop);
   if (!measured) return measured.error();
-  out.findings = judge_lines(out.lines, out.controls);
-  for (const std::vector<std::string>& sentences : {sentences_of(out.findings), out.sweep.sentences}) {
+  out.findings = judge_lines(out.lines, out.controls, out.objects);
+  const std::vector<std::string> about_controls =
+      out.controls.empty() ? std::vector<std::string>() : control_sentences(out.objects, out.object_cover);
+  for (const std::vector<std::string>& sentences : {sentences_of(out.findings), about_controls, out.sweep.sentences}) {
     out.verdict.insert(out.verdict.end(), sentences.begin(), sentences.end());
   }
   std::uint64_t covered_px = 0;
   const std::vector<LabelArea> areas = label_areas(out.cells);
   for (const LabelArea& area : areas) covered_px += area.area_px;
-  out.cell_count = areas.size();
-  if (!areas.empty()) out.cell_area_mean_px = static_cast<double>(covered_px) / static_cast<double>(areas.size());
+  out.object_count = areas.size();
+  if (!areas.empty()) out.object_area_mean_px = static_cast<double>(covered_px) / static_cast<double>(areas.size());
   return out;
 }
 
@@ -179,12 +205,6 @@ Json encode_picture_result(const PictureMeasurement& measurement) {
   Json steps = Json::array();
   for (const StepImage& step : measurement.analysis.segmentation.steps) {
     steps.push_back({{"name", step.name}, {"text", step.text}});
-  }
-  Json controls = Json::array();
-  for (const ControlReport& control : measurement.controls) {
-    controls.push_back({{"name", control.name},
-                        {"walls", encode_line(control.lines.walls)},
-                        {"outline", encode_line(control.lines.outline)}});
   }
   Json measurements = nullptr;
   if (measurement.report) {
@@ -195,11 +215,13 @@ Json encode_picture_result(const PictureMeasurement& measurement) {
           {"segmentation", encode_segmentation(measurement.analysis)},
           {"steps", std::move(steps)},
           {"verdict", measurement.verdict},
-          {"cell_count", measurement.cell_count},
-          {"cell_area_mean_px", measurement.cell_area_mean_px},
+          {"object_kind", name_of(measurement.objects)},
+          {"object_count", measurement.object_count},
+          {"object_area_mean_px", measurement.object_area_mean_px},
+          {"object_cover", measurement.object_cover},
           {"fractal",
            {{"walls", encode_line(measurement.lines.walls)}, {"outline", encode_line(measurement.lines.outline)}}},
-          {"controls", std::move(controls)},
+          {"controls", encode_controls(measurement.controls)},
           {"findings", encode_findings(measurement.findings)},
           {"threshold_sweep", encode_threshold_sweep(measurement.sweep)},
           {"measurements", std::move(measurements)},

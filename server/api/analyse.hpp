@@ -1,6 +1,7 @@
 // analyse: a picture that somebody sent, from its bytes to what is measured on it: the steps between decoding and JSON.
 // Promise: a result and its step images are functions of the bytes, the options and the program: steps are made again when asked for.
-// Cells:   nuclei and phase give objects; contours gives ink, whose enclosed areas are the cells. Walls of ink are the ink itself.
+// Objects: contours gives ink, whose enclosed areas are cells, and whose walls are the ink itself; phase gives regions of cells; nuclei gives nuclei
+//          where it was asked for, else objects: no histogram knows what a stain shows, and in a dish they are colonies.
 // Errors:  those of analyse_image. Throws Stopped.     Threads: pure; the thread count cannot matter.
 #pragma once
 
@@ -23,6 +24,9 @@ struct ImageOptions {
   Foreground foreground = Foreground::kAuto;
   std::optional<int> threshold;
   bool clahe = false;
+  bool split = true;
+  std::optional<std::int64_t> area_min_px, hole_max_px, background_reach_px;
+  std::int64_t window_radius_px = SegmentOptions().window_radius_px;
 };
 
 Json encode_image_options(const ImageOptions& options);
@@ -42,8 +46,10 @@ struct PictureMeasurement {
   std::optional<LabelReport> report;  // none for ink, or where `reason` says why
   std::string reason;
   std::vector<std::string> verdict;
-  std::uint64_t cell_count = 0;
-  double cell_area_mean_px = 0.0;     // 0 without cells
+  ObjectKind objects = ObjectKind::kObjects;
+  std::uint64_t object_count = 0;
+  double object_area_mean_px = 0.0;   // 0 without objects
+  double object_cover = 0.0;          // of their hull
 };
 
 enum class Sweep { kMake, kLeaveOut };  // eight more segmentations and twice as many countings

@@ -15,6 +15,8 @@ Effort effort_of(const Context& context);
 
 /// Stores, nudges the worker if there is something left to do, and answers 201 or 202.
 http::Response created(Context& context, const Call& call, const NewAnalysis& analysis);
+/// The row, whose has_source is false if the job of a comparison is gone too.
+AnalysisRow with_job(Context& context, AnalysisRow row);
 http::Response listed(Context& context, const Call& call, AnalysisKind kind);
 http::Response csv_response(std::string text);
 http::Response removed(Context& context, const Call& call, AnalysisKind kind);

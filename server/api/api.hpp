@@ -53,8 +53,11 @@ inline constexpr std::int64_t kComparedAtOncePixelsMax = 2'500'000;
 inline constexpr std::size_t kComparedAtOnceCellsMax = 20'000;
 /// A picture is held in memory as its file: at most some 200 MB.
 inline constexpr std::int64_t kServedPictureSideMax_px = 8192;
-inline constexpr std::uint64_t kMeshTrianglesDefault = 200'000;
+/// triangles_max unless it is given: so many a cell, at least as many, at most kServedMeshTrianglesMax.
+inline constexpr std::int64_t kMeshTrianglesPerCellDefault = 400;
+inline constexpr std::int64_t kMeshTrianglesDefaultMin = 200'000;
 inline constexpr std::int64_t kServedMeshTrianglesMax = 4'000'000;  // 50 bytes each, and the file once more
+std::int64_t mesh_triangles_default(std::size_t cell_count);
 inline constexpr std::uint32_t kPackingPoints = 1024;               // a cell's volume to 1.1 %
 /// Placing more founders than this can take long: one submission at a time may.
 inline constexpr std::uint64_t kFoundersPlacedFreely = 1000;
@@ -125,6 +128,8 @@ http::Access access_of(const Endpoint& endpoint);
 std::span<const Endpoint> endpoints();
 /// Rows of the table that stand beside their handlers (handlers_fork.cpp).
 std::vector<Endpoint> fork_endpoints();
+/// The part of it in endpoints_analyses.cpp.
+std::vector<Endpoint> analysis_endpoints();
 /// The part of it in endpoints_pages.cpp.
 std::vector<Endpoint> further_endpoints();
 
@@ -186,11 +191,14 @@ http::Response get_mesh(Context& context, const Call& call);
 http::Response get_analysis_of_job(Context& context, const Call& call);
 http::Response get_image(Context& context, const Call& call);
 http::Response get_log(Context& context, const Call& call);
+/// What POST /v1/analyses takes in its query; they stand where they are read.
+std::vector<QueryParam> analysis_params();
 http::Response post_analysis(Context& context, const Call& call);
 http::Response get_analyses(Context& context, const Call& call);
 http::Response get_analysis(Context& context, const Call& call);
 http::Response delete_analysis(Context& context, const Call& call);
 http::Response get_analysis_objects(Context& context, const Call& call);
+http::Response get_analysis_steps(Context& context, const Call& call);
 http::Response get_analysis_step(Context& context, const Call& call);
 http::Response post_comparison(Context& context, const Call& call);
 http::Response get_comparisons(Context& context, const Call& call);

@@ -60,24 +60,31 @@ Json encode_colony(const ColonyShape& colony, std::optional<double> um_per_px) {
           {"excess_perimeter", colony.excess_perimeter}};
 }
 
-Json encode_sides(const LabelReport& report) {
-  const auto interior = std::count_if(report.contacts.cells.begin(), report.contacts.cells.end(),
-                                      [](const CellContacts& cell) { return cell.interior; });
+Json encode_sides(const SideStatistics& sides) {
   Json classes = Json::array();
-  for (std::size_t i = 0; i < report.sides.counts.size(); ++i) {
+  for (std::size_t i = 0; i < sides.counts.size(); ++i) {
     classes.push_back({{"sides", kSidesFirst + i},
-                       {"count", report.sides.counts[i]},
-                       {"share", report.sides.shares[i]},
+                       {"count", sides.counts[i]},
+                       {"share", sides.shares[i]},
                        {"gibson_share", kGibsonShares[i]}});
   }
-  return {{"interior_count", interior},
-          {"other_count", report.sides.other_count},
+  return {{"other_count", sides.other_count},
           {"classes", std::move(classes)},
-          {"sides_mean", report.sides.sides_mean},
-          {"difference_max", report.sides.difference_max},
-          {"chi_square", or_null(report.sides.chi_square)},
-          {"degrees", report.sides.degrees},
-          {"p_value", or_null(report.sides.p_value)}};
+          {"sides_mean", sides.sides_mean},
+          {"difference_max", sides.difference_max},
+          {"chi_square", or_null(sides.chi_square)},
+          {"degrees", sides.degrees},
+          {"p_value", or_null(sides.p_value)}};
+}
+
+Json encode_neighbours(const LabelReport& report) {
+  Json out = encode_sides(report.sides);
+  out["interior_count"] = std::count_if(report.contacts.cells.begin(), report.contacts.cells.end(),
+                                        [](const CellContacts& cell) { return cell.interior; });
+  const ClosedSides& closed = report.closed_sides;
+  out["holes_given"] = encode_sides(closed.sides);
+  out["holes_given"].update({{"hole_max_px", closed.hole_max_px}, {"hole_count", closed.hole_count}, {"hole_px", closed.hole_px}});
+  return out;
 }
 
 Json encode_straightness(const std::optional<SiblingStraightness>& siblings) {
@@ -150,6 +157,17 @@ Json encode_line(const MeasuredLine& line) {
           {"reason", nullptr}};
 }
 
+Json encode_controls(const std::vector<ControlReport>& controls) {
+  Json list = Json::array();
+  for (const ControlReport& control : controls) {
+    list.push_back({{"name", control.name},
+                    {"placement", name_of(control.placement)},
+                    {"walls", encode_line(control.lines.walls)},
+                    {"outline", encode_line(control.lines.outline)}});
+  }
+  return list;
+}
+
 Json encode_findings(const LineFindings& findings) {
   const auto one = [](const LineFinding& line) -> Json {
     if (line.finding == Finding::kNoFigures) {
@@ -183,12 +201,6 @@ Json encode_threshold_sweep(const ThresholdSweep& sweep) {
 }
 
 Json encode_report(const LabelReport& report) {
-  Json controls = Json::array();
-  for (const ControlReport& control : report.controls) {
-    controls.push_back({{"name", control.name},
-                        {"walls", encode_line(control.lines.walls)},
-                        {"outline", encode_line(control.lines.outline)}});
-  }
   return {{"um_per_px", or_null(report.um_per_px)},
           {"cell_count", report.cell_count},
           {"cell_area_mean_px", report.cell_area_mean_px},
@@ -196,7 +208,8 @@ Json encode_report(const LabelReport& report) {
           {"verdict", report.verdict},
           {"findings", encode_findings(report.findings)},
           {"fractal", {{"walls", encode_line(report.lines.walls)}, {"outline", encode_line(report.lines.outline)}}},
-          {"controls", std::move(controls)},
+          {"controls", encode_controls(report.controls)},
+          {"object_cover", report.object_cover},
           {"colony", encode_colony(report.colony, report.um_per_px)},
           {"cells",
            {{"area_px", spread(report.shapes, [](const Shape& s) { return static_cast<double>(s.area_px); })},
@@ -204,7 +217,7 @@ Json encode_report(const LabelReport& report) {
             {"circularity", spread(report.shapes, [](const Shape& s) { return s.circularity; })},
             {"solidity", spread(report.shapes, [](const Shape& s) { return s.solidity; })},
             {"eccentricity", spread(report.shapes, [](const Shape& s) { return s.eccentricity; })}}},
-          {"neighbours", encode_sides(report)},
+          {"neighbours", encode_neighbours(report)},
           {"sibling_straightness", encode_straightness(report.siblings)},
           {"rings", encode_rings(report)},
           {"apart",
@@ -228,7 +241,8 @@ Json encode_packing(const Result<PackingStatistics>& packing) {
 
 Json encode_growth(const Result<GrowthPhases>& growth) {
   if (!growth) return {{"reason", growth.error().message}};
-  return {{"exponential", encode_phase(growth->exponential, "doubling_time_h")},
+  return {{"lag", encode_phase(growth->lag, "cell_count")},
+          {"exponential", encode_phase(growth->exponential, "doubling_time_h")},
           {"linear_radius", encode_phase(growth->linear_radius, "speed_um_per_h")},
           {"plateau", encode_phase(growth->plateau, "cell_count")},
           {"relative_sd", growth->relative_sd},

@@ -17,6 +17,8 @@ Json encode_line(const MeasuredLine& line);
 Json encode_report(const LabelReport& report);
 Json encode_packing(const Result<PackingStatistics>& packing);
 Json encode_growth(const Result<GrowthPhases>& growth);
+/// With where their discs lie.
+Json encode_controls(const std::vector<ControlReport>& controls);
 Json encode_findings(const LineFindings& findings);
 Json encode_threshold_sweep(const ThresholdSweep& sweep);
 /// What the file was, and where the scale came from.

@@ -231,6 +231,11 @@ void add_component_examples(Json& schemas) {
   add("SeriesRow", one(series));
   add("Series", page(series, nullptr));
   add("LogLine", one(log));
+  const Json step = {{"name", "grey"},
+                     {"text", "the channel that is analysed, as 8 bits"},
+                     {"href", "/v1/analyses/01a21486-926b-7bfd-87d8-22eafb110b27/steps/grey"}};
+  add("Step", one(step));
+  add("StepList", page(step, nullptr));
   add("Problem", one(problem_example()));
 }
 

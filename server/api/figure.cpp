@@ -1,185 +1,353 @@
-// The figure of a comparison: like figures 1 and 2 of the paper, side by side for the simulated and the real colony.
+// The figure of a comparison, like figures 1 and 2 of the paper, the simulated colony on the left and the real one on the right: what was counted, in
+// one scale; box counts with the fitted lines; slopes from small to large boxes, which a line hides.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <string>
-#include <string_view>
 
+#include "engine/analysis/canvas.hpp"
 #include "engine/analysis/contour.hpp"
 #include "engine/base/check.hpp"
-#include "engine/picture/glyphs.hpp"
 #include "server/api/compare.hpp"
 
 namespace colony::server::api {
 namespace {
 
-constexpr std::int64_t kPanel_px = 620;
-constexpr std::int64_t kGap_px = 40;
-constexpr std::int64_t kTitle_px = 40;
-constexpr std::int64_t kTextScale = 2;
-constexpr Rgb kAxis{0x60, 0x60, 0x60};
-constexpr Rgb kGrid{0xe4, 0xe4, 0xe4};
+constexpr double kPanelWidth_px = 740, kContourHeight_px = 620, kCountHeight_px = 560, kSlopeHeight_px = 250;
+constexpr double kLeft_px = 96, kBetween_px = 104, kRight_px = 28;
+constexpr double kTitle_px = 52, kRowGap_px = 60, kAxisText_px = 70, kLegendRow_px = 26, kBottom_px = 66;
+constexpr Ink kBlack{0, 0, 0}, kAxis{0x40, 0x40, 0x40}, kGrid{0xe6, 0xe6, 0xe6}, kBand{0xf1, 0xf4, 0xf9}, kPictureFrame{0xc8, 0xc8, 0xc8};
+constexpr double kBar_px = 60.0;  // of a panel, for the scale bar
+constexpr Ink kOutlineInk{0x1f, 0x77, 0xb4};
 
 struct Panel {
-  std::int64_t row = 0, column = 0;  // of its upper left pixel
+  double x = 0.0, y = 0.0, width = kPanelWidth_px, height = 0.0;
 };
 
-/// A curve of the plot: ln N against ln s, its mark and its line.
+/// A line that was counted: all its boxes, and the fit over those that are compared.
 struct Curve {
-  std::string_view name;
-  const BoxDimensions* found = nullptr;
-  Rgb colour;
+  std::string name;
+  const MeasuredLine* all = nullptr;
+  const MeasuredLine* compared = nullptr;
+  Ink ink;
+  bool is_control = false;
 };
 
-// The lines in the panel: a pixel is as dark as the darkest of what it stands for, so that no thin line is lost.
-void draw_lines(Picture& picture, const Panel& panel, const BinaryImage& lines) {
-  const double step = std::max(1.0, static_cast<double>(std::max(lines.width_px, lines.height_px)) /
-                                        static_cast<double>(kPanel_px));
-  const auto place = [step](std::int64_t at) { return static_cast<std::int64_t>(static_cast<double>(at) / step); };
-  const std::int64_t down = (kPanel_px - place(lines.height_px)) / 2;
-  const std::int64_t right = (kPanel_px - place(lines.width_px)) / 2;
-  for (std::int64_t row = 0; row < lines.height_px; ++row) {
-    for (std::int64_t column = 0; column < lines.width_px; ++column) {
-      if (lines.at(row, column) == 0) continue;
-      put_pixel(picture, panel.row + std::min(down + place(row), kPanel_px - 1),
-                panel.column + std::min(right + place(column), kPanel_px - 1), {0, 0, 0});
-    }
-  }
-}
-
-void draw_frame(Picture& picture, const Panel& panel) {
-  fill_rectangle(picture, panel.row, panel.column, 1, kPanel_px, kAxis);
-  fill_rectangle(picture, panel.row + kPanel_px - 1, panel.column, 1, kPanel_px, kAxis);
-  fill_rectangle(picture, panel.row, panel.column, kPanel_px, 1, kAxis);
-  fill_rectangle(picture, panel.row, panel.column + kPanel_px - 1, kPanel_px, 1, kAxis);
-}
-
-std::string two_decimals(double value) {
-  char text[64];
-  std::snprintf(text, sizeof text, "%.2f", value);
+template <class... Values>
+std::string format(const char* form, Values... values) {
+  char text[160];
+  std::snprintf(text, sizeof text, form, values...);
   return text;
 }
 
-/// Axes shared by both plots, so that they can be read side by side.
-struct Axes {
-  double side_low = 1.0, side_high = 10.0, count_low = 1.0, count_high = 10.0;
+// --- what was counted ---
 
-  void take(const Curve& curve) {
-    for (const BoxCount& count : curve.found->counts) {
-      side_high = std::max(side_high, static_cast<double>(count.side_px));
-      count_high = std::max(count_high, count.count_mean);
+struct Drawing {
+  const BinaryImage* walls = nullptr;
+  const BinaryImage* outline = nullptr;
+  PixelBox part;  // of both
+};
+
+PixelBox united(const PixelBox& a, const PixelBox& b) {
+  if (a.width == 0) return b;
+  if (b.width == 0) return a;
+  const std::int64_t left = std::min(a.left, b.left), top = std::min(a.top, b.top);
+  return {left, top, std::max(a.left + a.width, b.left + b.width) - left, std::max(a.top + a.height, b.top + b.height) - top};
+}
+
+/// Pixels of the image for one of the panel.
+double step_of(const Drawing& drawing) {
+  constexpr double kFill = 0.94;
+  return std::max(static_cast<double>(drawing.part.width) / (kFill * kPanelWidth_px),
+                  static_cast<double>(drawing.part.height) / (kFill * (kContourHeight_px - kBar_px)));
+}
+
+/// Where the upper left corner of the part lies: in the middle of the panel, above the scale bar.
+CanvasPoint corner_of(const Panel& panel, const Drawing& drawing, double step) {
+  return {panel.x + (panel.width - static_cast<double>(drawing.part.width) / step) / 2.0,
+          panel.y + (panel.height - kBar_px - static_cast<double>(drawing.part.height) / step) / 2.0};
+}
+
+void draw_picture_frame(Canvas& canvas, const Panel& panel, const Drawing& drawing, double step) {
+  canvas.box(corner_of(panel, drawing, step), static_cast<double>(drawing.part.width) / step, static_cast<double>(drawing.part.height) / step,
+             kPictureFrame, false);
+}
+
+/// A line one pixel wide stays black when several pixels share one of the panel: its ink is spread over the width of a line there, not of the area.
+void draw_ink(Canvas& canvas, const Panel& panel, const Drawing& drawing, const BinaryImage& lines, double step, Ink ink) {
+  const auto [x, y] = corner_of(panel, drawing, step);
+  const auto width = static_cast<std::int64_t>(panel.width), height = static_cast<std::int64_t>(panel.height);
+  std::vector<float> dark(static_cast<std::size_t>(width * height), 0.0F);
+  const std::int64_t repeat = std::max<std::int64_t>(1, static_cast<std::int64_t>(2.0 / step));  // finer than the panel's pixels
+  const double part = std::max(1.0, step) / (step * step) / static_cast<double>(repeat * repeat);
+  for (std::int64_t row = 0; row < drawing.part.height; ++row) {
+    for (std::int64_t column = 0; column < drawing.part.width; ++column) {
+      if (lines.at(drawing.part.top + row, drawing.part.left + column) == 0) continue;
+      for (std::int64_t k = 0; k < repeat * repeat; ++k) {
+        const auto n = static_cast<double>(repeat);
+        const double at_y = y - panel.y + (static_cast<double>(row) + (static_cast<double>(k / repeat) + 0.5) / n) / step;
+        const double at_x = x - panel.x + (static_cast<double>(column) + (static_cast<double>(k % repeat) + 0.5) / n) / step;
+        const auto r = std::clamp<std::int64_t>(static_cast<std::int64_t>(at_y), 0, height - 1);
+        const auto c = std::clamp<std::int64_t>(static_cast<std::int64_t>(at_x), 0, width - 1);
+        dark[static_cast<std::size_t>(r * width + c)] += static_cast<float>(part);
+      }
     }
   }
-  std::int64_t column(double side) const {
-    return static_cast<std::int64_t>(std::log(side / side_low) / std::log(side_high / side_low) * (kPanel_px - 1));
+  for (std::int64_t row = 0; row < height; ++row) {
+    for (std::int64_t column = 0; column < width; ++column) {
+      const float share = dark[static_cast<std::size_t>(row * width + column)];
+      if (share > 0.0F) canvas.shade(static_cast<std::int64_t>(panel.y) + row, static_cast<std::int64_t>(panel.x) + column, ink, share);
+    }
   }
-  std::int64_t row(double count) const {
-    return kPanel_px - 1 -
-           static_cast<std::int64_t>(std::log(count / count_low) / std::log(count_high / count_low) * (kPanel_px - 1));
+}
+
+/// 1, 2 or 5 times a power of ten, at most `most`.
+double round_length(double most) {
+  double best = 1e-9;
+  for (double decade = 1e-6; decade < 1e9; decade *= 10.0) {
+    for (const double digit : {1.0, 2.0, 5.0}) best = digit * decade <= most ? digit * decade : best;
+  }
+  return best;
+}
+
+void draw_bar(Canvas& canvas, const Panel& panel, double step, std::optional<double> um_per_px) {
+  const double most = 0.3 * panel.width * step;  // in px of the image
+  const double length_px = um_per_px ? round_length(most * *um_per_px) / *um_per_px : round_length(most);
+  const std::string text = um_per_px ? format("%.4g um (%.0f px)", length_px * *um_per_px, length_px) : format("%.4g px", length_px);
+  const double y = panel.y + panel.height - 30.0, x = panel.x + 20.0;
+  canvas.box({x, y - 3.0}, length_px / step, 6.0, kBlack, true);
+  canvas.text({x + length_px / step + 14.0, y + 6.0}, text, kBlack);
+}
+
+// --- plots ---
+
+struct Axes {
+  double x_low = 1e300, x_high = 0.0, y_low = 1e300, y_high = 0.0;
+
+  void take(const Curve& curve) {
+    for (const BoxCount& count : curve.all->dimensions->counts) {
+      const auto side = static_cast<double>(count.side_px);
+      x_low = std::min(x_low, side);
+      x_high = std::max(x_high, side);
+      y_low = std::min(y_low, count.count_mean);
+      y_high = std::max(y_high, count.count_mean);
+    }
+  }
+  double x(const Panel& panel, double side) const { return panel.x + std::log(side / x_low) / std::log(x_high / x_low) * panel.width; }
+  double y(const Panel& panel, double count) const {
+    return panel.y + panel.height - std::log(count / y_low) / std::log(y_high / y_low) * panel.height;
   }
 };
 
-void draw_decades(Picture& picture, const Panel& panel, const Axes& axes) {
-  for (double decade = 1.0; decade <= axes.side_high; decade *= 10.0) {
-    const std::int64_t column = panel.column + axes.column(decade);
-    fill_rectangle(picture, panel.row, column, kPanel_px, 1, kGrid);
-    draw_text(picture, panel.row + kPanel_px + 6, column, std::to_string(static_cast<std::int64_t>(decade)), kTextScale,
-              kAxis);
-  }
-  for (double decade = 1.0; decade <= axes.count_high; decade *= 10.0) {
-    const std::int64_t row = panel.row + axes.row(decade);
-    fill_rectangle(picture, row, panel.column, 1, kPanel_px, kGrid);
-    draw_text(picture, row - kTextScale * kGlyphHeight_px, panel.column + 4,
-              std::to_string(static_cast<std::int64_t>(decade)), kTextScale, kAxis);
-  }
-}
-
-void draw_curve(Picture& picture, const Panel& panel, const Axes& axes, const Curve& curve) {
-  const std::vector<BoxCount>& counts = curve.found->counts;
-  for (std::size_t i = 0; i < counts.size(); ++i) {
-    const auto side = static_cast<double>(counts[i].side_px);
-    fill_rectangle(picture, panel.row + axes.row(counts[i].count_mean) - 3, panel.column + axes.column(side) - 3, 7, 7,
-                   curve.colour);
-    if (i == 0) continue;
-    const auto before = static_cast<double>(counts[i - 1].side_px);
-    for (std::int64_t x = axes.column(before); x <= axes.column(side); ++x) {
-      const double share = axes.column(side) == axes.column(before)
-                               ? 0.0
-                               : static_cast<double>(x - axes.column(before)) /
-                                     static_cast<double>(axes.column(side) - axes.column(before));
-      const double count = std::exp(std::log(counts[i - 1].count_mean) * (1.0 - share) +
-                                    std::log(counts[i].count_mean) * share);
-      put_pixel(picture, panel.row + axes.row(count), panel.column + x, curve.colour);
+/// 1, 2, 5, 10, ... within the axis; only powers of ten where it is long.
+std::vector<double> ticks(double low, double high) {
+  std::vector<double> all;
+  const bool is_long = high / low > 2000.0;
+  for (double decade = 1e-3; decade <= high; decade *= 10.0) {
+    for (const double digit : {1.0, 2.0, 5.0}) {
+      const double value = digit * decade;
+      if (value >= low && value <= high && (digit == 1.0 || !is_long)) all.push_back(value);
     }
   }
+  return all;
 }
 
-std::vector<Curve> curves_of(const LineReport& lines, const std::vector<ControlReport>& controls) {
+void draw_frame(Canvas& canvas, const Panel& panel) { canvas.box({panel.x, panel.y}, panel.width, panel.height, kAxis, false); }
+
+/// The range that is compared, as a band, and the ticks of the box sides.
+void draw_sides(Canvas& canvas, const Panel& panel, const Axes& axes, const Curve* compared) {
+  if (compared != nullptr) {
+    const BoxDimensions& found = *compared->compared->dimensions;
+    const double from = axes.x(panel, static_cast<double>(found.side_min_px)), to = axes.x(panel, static_cast<double>(found.side_max_px));
+    canvas.box({from, panel.y}, to - from, panel.height, kBand, true);
+  }
+  for (const double side : ticks(axes.x_low, axes.x_high)) {
+    const double x = axes.x(panel, side);
+    canvas.line({x, panel.y}, {x, panel.y + panel.height}, kGrid);
+    canvas.text({x, panel.y + panel.height + 24.0}, format("%.0f", side), kAxis, Align::kCentre);
+  }
+}
+
+void draw_counts(Canvas& canvas, const Panel& panel, const Axes& axes, const std::vector<Curve>& curves) {
+  const auto with_fit = std::find_if(curves.begin(), curves.end(), [](const Curve& c) { return !c.is_control && c.compared->dimensions; });
+  draw_sides(canvas, panel, axes, with_fit == curves.end() ? nullptr : &*with_fit);
+  for (const double count : ticks(axes.y_low, axes.y_high)) {
+    const double y = axes.y(panel, count);
+    canvas.line({panel.x, y}, {panel.x + panel.width, y}, kGrid);
+    canvas.text({panel.x - 10.0, y + 6.0}, format("%.0f", count), kAxis, Align::kRight);
+  }
+  canvas.text({panel.x + panel.width, panel.y + panel.height + 50.0}, "box side s, px", kAxis, Align::kRight);
+  // Controls first: the lines in question lie over them.
+  for (const bool is_control : {true, false}) {
+    for (const Curve& curve : curves) {
+      if (curve.is_control != is_control) continue;
+      std::vector<CanvasPoint> points;
+      for (const BoxCount& count : curve.all->dimensions->counts) {
+        points.push_back({axes.x(panel, static_cast<double>(count.side_px)), axes.y(panel, count.count_mean)});
+      }
+      if (is_control) {
+        canvas.lines(points, curve.ink, 1.5);
+        continue;
+      }
+      if (!curve.compared->dimensions) {
+        for (const CanvasPoint& point : points) canvas.dot(point, 4.5, curve.ink, false);
+        continue;
+      }
+      const BoxDimensions& fit = *curve.compared->dimensions;
+      double mean_x = 0.0, mean_y = 0.0;  // least squares pass through the means
+      for (const BoxCount& count : fit.counts) {
+        mean_x += std::log(static_cast<double>(count.side_px)) / static_cast<double>(fit.counts.size());
+        mean_y += std::log(count.count_mean) / static_cast<double>(fit.counts.size());
+      }
+      const auto on_line = [&](std::int64_t side) {
+        const double x = std::log(static_cast<double>(side));
+        return CanvasPoint{axes.x(panel, static_cast<double>(side)), axes.y(panel, std::exp(mean_y - fit.capacity.value * (x - mean_x)))};
+      };
+      canvas.line(on_line(fit.side_min_px), on_line(fit.side_max_px), curve.ink, 1.5);
+      for (std::size_t i = 0; i < points.size(); ++i) canvas.dot(points[i], 4.5, curve.ink, i < fit.counts.size());
+    }
+  }
+  draw_frame(canvas, panel);
+}
+
+/// Below the plot, since its curves may run anywhere in it.
+void draw_legend(Canvas& canvas, const Panel& panel, const std::vector<Curve>& curves) {
+  double y = panel.y + 16.0;
+  const double text_x = panel.x + 52.0, value_x = panel.x + 330.0;
+  const BoxDimensions* fitted = nullptr;
+  for (const Curve& curve : curves) {
+    canvas.line({panel.x, y - 5.0}, {panel.x + 38.0, y - 5.0}, curve.ink, curve.is_control ? 1.5 : 2.0);
+    if (!curve.is_control) canvas.dot({panel.x + 19.0, y - 5.0}, 4.5, curve.ink, true);
+    canvas.text({text_x, y}, curve.name, kBlack);
+    if (curve.compared->dimensions) {
+      const Dimension& d0 = curve.compared->dimensions->capacity;
+      canvas.text({value_x, y}, format("D0 %.3f +- %.3f, r2 %.3f", d0.value, d0.standard_error, d0.r2), kBlack);
+      if (!curve.is_control && fitted == nullptr) fitted = &*curve.compared->dimensions;
+    } else {
+      canvas.text({value_x, y}, "too few box sides in common", kBlack);
+    }
+    y += kLegendRow_px;
+  }
+  if (fitted == nullptr) return;
+  canvas.text({text_x, y}, format("D0 = -slope, fitted for boxes of %.0f to %.0f px (shaded)", static_cast<double>(fitted->side_min_px),
+                                  static_cast<double>(fitted->side_max_px)), kAxis);
+}
+
+struct SlopeRange {
+  double low = 0.95, high = 1.05;
+  void take(const Curve& curve) {
+    for (const LocalSlope& slope : windowed_slopes(*curve.all->dimensions)) {
+      low = std::min(low, slope.dimension - 0.05);
+      high = std::max(high, slope.dimension + 0.05);
+    }
+  }
+};
+
+void draw_slopes(Canvas& canvas, const Panel& panel, const Axes& axes, const SlopeRange& range, const std::vector<Curve>& curves) {
+  const auto with_fit = std::find_if(curves.begin(), curves.end(), [](const Curve& c) { return !c.is_control && c.compared->dimensions; });
+  draw_sides(canvas, panel, axes, with_fit == curves.end() ? nullptr : &*with_fit);
+  const auto y_of = [&](double slope) { return panel.y + panel.height - (slope - range.low) / (range.high - range.low) * panel.height; };
+  const double step = range.high - range.low > 0.6 ? 0.2 : 0.1;
+  for (int k = 0; k <= 30; ++k) {
+    const double slope = step * k;
+    if (slope < range.low || slope > range.high) continue;
+    canvas.line({panel.x, y_of(slope)}, {panel.x + panel.width, y_of(slope)}, kGrid);
+    canvas.text({panel.x - 10.0, y_of(slope) + 6.0}, format("%.1f", slope), kAxis, Align::kRight);
+  }
+  canvas.text({panel.x + panel.width, panel.y + panel.height + 50.0}, "box side s, px", kAxis, Align::kRight);
+  for (const bool is_control : {true, false}) {
+    for (const Curve& curve : curves) {
+      if (curve.is_control != is_control) continue;
+      std::vector<CanvasPoint> points;
+      for (const LocalSlope& slope : windowed_slopes(*curve.all->dimensions)) points.push_back({axes.x(panel, slope.side_px), y_of(slope.dimension)});
+      canvas.lines(points, curve.ink, is_control ? 1.5 : 2.0);
+      for (const CanvasPoint& point : points) {
+        if (!is_control) canvas.dot(point, 3.5, curve.ink, true);
+      }
+    }
+  }
+  draw_frame(canvas, panel);
+}
+
+/// Of single things the outer outline is that of each, and would only hide the other line.
+bool has_outline(ObjectKind kind) { return kind == ObjectKind::kCells || kind == ObjectKind::kRegions; }
+
+std::vector<Curve> curves_of(const LineReport& all, const std::vector<ControlReport>& controls, const ComparedSide& side, ObjectKind kind) {
+  const LineNames names = line_names(kind);
   std::vector<Curve> curves;
-  if (lines.walls.dimensions) curves.push_back({"cell walls", &*lines.walls.dimensions, {0, 0, 0}});
-  if (lines.outline.dimensions) curves.push_back({"outline", &*lines.outline.dimensions, {0x1f, 0x77, 0xb4}});
-  for (const ControlReport& control : controls) {
-    if (!control.lines.walls.dimensions) continue;
-    Curve curve{"control", &*control.lines.walls.dimensions, {0x80, 0x80, 0x80}};
-    if (control.name == "without_noise") curve = {"walls without noise", curve.found, {0x2c, 0xa0, 0x2c}};
-    if (control.name == "hexagonal") curve = {"hexagonal discs", curve.found, {0xd6, 0x27, 0x28}};
-    if (control.name == "random_discs") curve = {"random discs", curve.found, {0xff, 0x7f, 0x0e}};
-    curves.push_back(curve);
+  const auto add = [&](const std::string& name, const MeasuredLine& line, const MeasuredLine& compared, Ink ink, bool is_control) {
+    if (line.dimensions) curves.push_back({name, &line, &compared, ink, is_control});
+  };
+  add(names.walls, all.walls, side.lines.walls, kBlack, false);
+  if (has_outline(kind)) add(names.outline, all.outline, side.lines.outline, kOutlineInk, false);
+  for (std::size_t i = 0; i < controls.size(); ++i) {
+    const std::string& name = controls[i].name;
+    const bool is_smooth = name == "without_noise", is_hexagonal = name == "hexagonal";
+    add(is_smooth ? "control, without noise" : is_hexagonal ? "control, hexagonal discs" : "control, random discs", controls[i].lines.walls,
+        side.controls[i].lines.walls, is_smooth ? Ink{0x2c, 0xa0, 0x2c} : is_hexagonal ? Ink{0xd6, 0x27, 0x28} : Ink{0xe0, 0x82, 0x14}, true);
   }
   return curves;
 }
 
-void draw_plot(Picture& picture, const Panel& panel, const Axes& axes, const std::vector<Curve>& curves) {
-  draw_decades(picture, panel, axes);
-  draw_frame(picture, panel);
-  std::int64_t line = panel.row + 10;
-  for (const Curve& curve : curves) {
-    draw_curve(picture, panel, axes, curve);
-    std::string text(curve.name);
-    text += "  ";
-    text += two_decimals(curve.found->capacity.value);
-    if (curve.found->crossover.found) text += " crossover";
-    draw_text(picture, line, panel.column + kPanel_px - 10 - kTextScale * text_width_px(text), text, kTextScale,
-              curve.colour);
-    line += kTextScale * (kGlyphHeight_px + 2);
-  }
+std::string counted(const char* letter, const char* whose, std::uint64_t count, ObjectKind kind) {
+  return std::string("(") + letter + ") " + whose + ", " + std::to_string(count) + " " + std::string(count == 1 ? singular_of(kind) : name_of(kind));
 }
 
 }  // namespace
 
 std::string comparison_figure(const Comparison& comparison) {
-  Picture picture;
-  picture.width_px = 2 * kPanel_px + 3 * kGap_px;
-  picture.height_px = 2 * kPanel_px + 2 * kTitle_px + 3 * kGap_px;
-  picture.um_per_px = 1.0;
-  picture.rgb.assign(static_cast<std::size_t>(3 * picture.width_px * picture.height_px), 0xff);
-  const Panel panels[2][2] = {
-      {{kTitle_px, kGap_px}, {kTitle_px, 2 * kGap_px + kPanel_px}},
-      {{2 * kTitle_px + kGap_px + kPanel_px, kGap_px}, {2 * kTitle_px + kGap_px + kPanel_px, 2 * kGap_px + kPanel_px}}};
-  const auto walls = cell_walls(comparison.image.labels);
-  CHECK(static_cast<bool>(walls));  // they were measured
-  draw_lines(picture, panels[0][0], *walls);
-  draw_lines(picture, panels[0][1], comparison.real.walls);
-  const std::vector<Curve> curves[2] = {curves_of(comparison.simulated.lines, comparison.simulated.controls),
-                                        curves_of(comparison.real.lines, comparison.real.controls)};
+  const auto walls = cell_walls(comparison.image.labels), outline = colony_outline(comparison.image.labels);
+  CHECK(walls && outline);  // they were measured
+  // Of the colony what is drawn; of the picture all of its frame, which cuts things.
+  const Drawing drawings[2] = {{&*walls, &*outline, united(foreground_box(*walls), foreground_box(*outline))},
+                               {&comparison.real.walls, &comparison.real.outline,
+                                {0, 0, comparison.real.walls.width_px, comparison.real.walls.height_px}}};
+  const double step = std::max({0.25, step_of(drawings[0]), step_of(drawings[1])});
+  const std::vector<Curve> curves[2] = {
+      curves_of(comparison.simulated.lines, comparison.simulated.controls, comparison.simulated_side, comparison.match.simulated),
+      curves_of(comparison.real.lines, comparison.real.controls, comparison.real_side, comparison.real.objects)};
+  // Shared by both plots, so that they can be read side by side.
   Axes axes;
+  SlopeRange slopes;
   for (const auto& side : curves) {
-    for (const Curve& curve : side) axes.take(curve);
+    for (const Curve& curve : side) {
+      axes.take(curve);
+      slopes.take(curve);
+    }
   }
-  axes.side_high *= 1.2;
-  axes.count_high *= 12.0;  // room for the legend
+  if (axes.x_high == 0.0) axes = {1.0, 10.0, 1.0, 10.0};
+  axes = {axes.x_low / 1.12, axes.x_high * 1.12, axes.y_low / 1.4, axes.y_high * 1.4};
+
+  const double rows = static_cast<double>(std::max(curves[0].size(), curves[1].size())) + 1.0;
+  const double count_y = kTitle_px + kContourHeight_px + kRowGap_px, legend_y = count_y + kCountHeight_px + kAxisText_px;
+  const double slope_y = legend_y + rows * kLegendRow_px + kRowGap_px;
+  Canvas canvas(static_cast<std::int64_t>(kLeft_px + 2.0 * kPanelWidth_px + kBetween_px + kRight_px),
+                static_cast<std::int64_t>(slope_y + kSlopeHeight_px + kBottom_px));
   for (int i = 0; i < 2; ++i) {
-    draw_frame(picture, panels[0][i]);
-    draw_plot(picture, panels[1][i], axes, curves[i]);
-    const std::uint64_t cells = i == 0 ? comparison.simulated.cell_count : comparison.real.cell_count;
-    char title[64];
-    std::snprintf(title, sizeof title, "%s %llu cells", i == 0 ? "simulated" : "real",
-                  static_cast<unsigned long long>(cells));
-    draw_text(picture, 12, panels[0][i].column, title, kTextScale, {0, 0, 0});
-    std::snprintf(title, sizeof title, "%s boxes met by side in px", i == 0 ? "simulated" : "real");
-    draw_text(picture, panels[1][i].row - 26, panels[1][i].column, title, kTextScale, {0, 0, 0});
+    const double x = kLeft_px + i * (kPanelWidth_px + kBetween_px);
+    const Panel contours{x, kTitle_px, kPanelWidth_px, kContourHeight_px}, counts{x, count_y, kPanelWidth_px, kCountHeight_px},
+        course{x, slope_y, kPanelWidth_px, kSlopeHeight_px};
+    const bool is_simulated = i == 0;
+    canvas.text({x, kTitle_px - 16.0},
+                is_simulated ? counted("a", "simulated", comparison.simulated.cell_count, comparison.match.simulated) +
+                                   format(", %.0f h", comparison.at.time_h)
+                             : counted("b", "real", comparison.real.object_count, comparison.real.objects),
+                kBlack, Align::kLeft, 16.0);
+    if (!is_simulated) draw_picture_frame(canvas, contours, drawings[i], step);
+    draw_ink(canvas, contours, drawings[i], *drawings[i].walls, step, kBlack);
+    if (has_outline(is_simulated ? comparison.match.simulated : comparison.real.objects)) {
+      draw_ink(canvas, contours, drawings[i], *drawings[i].outline, step, kOutlineInk);
+    }
+    draw_bar(canvas, contours, step, is_simulated ? std::optional(comparison.um_per_px) : comparison.real.analysis.um_per_px);
+    draw_frame(canvas, contours);
+    canvas.text({x, count_y - 16.0}, std::string(is_simulated ? "(c)" : "(d)") + " boxes met, N(s)", kBlack, Align::kLeft, 16.0);
+    draw_counts(canvas, counts, axes, curves[i]);
+    draw_legend(canvas, {x, legend_y, kPanelWidth_px, 0.0}, curves[i]);
+    canvas.text({x, slope_y - 16.0}, std::string(is_simulated ? "(e)" : "(f)") + " slope of N(s) through " + std::to_string(kSlopeWindow) + " sides", kBlack,
+                Align::kLeft, 16.0);
+    draw_slopes(canvas, course, axes, slopes, curves[i]);
   }
-  return encode_png(picture);
+  return encode_step_png(canvas.picture());
 }
 
 }  // namespace colony::server::api

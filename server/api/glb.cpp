@@ -13,7 +13,6 @@
 namespace colony::server::api {
 namespace {
 
-constexpr int kNucleusMaterial = 3;  // after the three activities
 constexpr std::array<double, 3> kNucleusColour = {0.20, 0.12, 0.39};
 constexpr double kCellOpacity = 0.45;  // nuclei are seen through the cells
 
@@ -39,11 +38,6 @@ std::array<double, 3> share_of(Rgb colour) { return {colour.red / 255.0, colour.
 class Writer {
  public:
   explicit Writer(const Mesh& mesh) : mesh_(mesh) {
-    for (const Activity activity : {Activity::kActive, Activity::kPassive, Activity::kSenescent}) {
-      model_.materials.push_back(
-          material(std::string(name_of(activity)) + " cell", share_of(activity_colour(activity)), kCellOpacity));
-    }
-    model_.materials.push_back(material("nucleus", kNucleusColour, 1.0));
     model_.asset.version = "2.0";
     model_.asset.generator = "colonyd";
     model_.asset.extras = tinygltf::Value(tinygltf::Value::Object{{"unit", tinygltf::Value(std::string("micrometre"))}});
@@ -54,11 +48,11 @@ class Writer {
   void add_cell(const MeshPart& cell, const MeshPart* nucleus, Activity activity) {
     tinygltf::Node node;
     node.name = "cell " + std::to_string(cell.id.value);
-    node.mesh = add_mesh(node.name, cell, static_cast<int>(activity));
+    node.mesh = add_mesh(node.name, cell, cell_material(activity));
     if (nucleus != nullptr && nucleus->index_count > 0) {
       tinygltf::Node inside;
       inside.name = "nucleus " + std::to_string(cell.id.value);
-      inside.mesh = add_mesh(inside.name, *nucleus, kNucleusMaterial);
+      inside.mesh = add_mesh(inside.name, *nucleus, nucleus_material());
       model_.nodes.push_back(std::move(inside));
       node.children = {static_cast<int>(model_.nodes.size() - 1)};
     }
@@ -83,6 +77,20 @@ class Writer {
 
  private:
   enum View { kPositions, kNormals, kIndices };
+
+  // A material is made when the first part has it: one that nothing has is a warning of validators.
+  int made(int& index, tinygltf::Material&& material) {
+    if (index < 0) {
+      model_.materials.push_back(std::move(material));
+      index = static_cast<int>(model_.materials.size() - 1);
+    }
+    return index;
+  }
+  int cell_material(Activity activity) {
+    return made(cell_materials_[static_cast<std::size_t>(activity)],
+                material(std::string(name_of(activity)) + " cell", share_of(activity_colour(activity)), kCellOpacity));
+  }
+  int nucleus_material() { return made(nucleus_material_, material("nucleus", kNucleusColour, 1.0)); }
 
   int add_accessor(tinygltf::Accessor accessor) {
     model_.accessors.push_back(std::move(accessor));
@@ -151,6 +159,8 @@ class Writer {
   }
 
   const Mesh& mesh_;
+  std::array<int, 3> cell_materials_{-1, -1, -1};  // by activity; -1: none yet
+  int nucleus_material_ = -1;
   tinygltf::Model model_;
   tinygltf::Node root_;
   std::vector<std::uint32_t> indices_;

@@ -1,6 +1,7 @@
 // Handlers of pictures that people send: analyse, list, show, steps, delete.
 #include <algorithm>
 
+#include "engine/analysis/reason.hpp"
 #include "server/api/analyse.hpp"
 #include "server/api/analysis_work.hpp"
 #include "server/api/api.hpp"
@@ -20,11 +21,20 @@ Enum enum_of(const Query& query, std::string_view name, std::initializer_list<st
 ImageOptions options_of(const Query& query) {
   ImageOptions options;
   options.um_per_px = query.number("um_per_px");
-  if (const auto channel = query.integer("channel")) options.channel = static_cast<std::int64_t>(*channel);
+  const auto whole = [&](const char* name) -> std::optional<std::int64_t> {
+    const auto value = query.integer(name);
+    return value ? std::optional(static_cast<std::int64_t>(*value)) : std::nullopt;
+  };
+  options.channel = whole("channel");
   options.pipeline = enum_of<Pipeline>(query, "pipeline", {"auto", "nuclei", "phase", "contours"});
   options.foreground = enum_of<Foreground>(query, "foreground", {"auto", "light", "dark"});
   if (const auto threshold = query.integer("threshold")) options.threshold = static_cast<int>(*threshold);
   options.clahe = query.boolean("clahe", false);
+  options.split = query.boolean("split", true);
+  options.area_min_px = whole("area_min_px");
+  options.hole_max_px = whole("hole_max_px");
+  options.background_reach_px = whole("background_reach_px");
+  options.window_radius_px = whole("window_radius_px").value_or(options.window_radius_px);
   return options;
 }
 
@@ -48,8 +58,10 @@ Result<ImageFormat> format_of(const http::Request& request) {
   return *format;
 }
 
-// What the engine calls `image` is the body.
+// What the engine calls `image` is the body. What a decoder says is about all of it.
 Error as_body_error(Error error) {
+  if (error.fields.empty() && error.code != ErrorCode::kInternal) error.fields = {{"image", error.message}};
+  error.message = reason_of(error);
   for (FieldError& field : error.fields) {
     if (field.pointer == "image") field.pointer = "";
   }
@@ -57,6 +69,24 @@ Error as_body_error(Error error) {
 }
 
 }  // namespace
+
+std::vector<QueryParam> analysis_params() {
+  constexpr double kObjectAreaMax_px = kImageSideMax_px * kImageSideMax_px;
+  return {{"name", QueryType::kText, 0, 0, {}, "a name for people"},
+          {"um_per_px", QueryType::kNumber, kImageScaleMin_um_per_px, kImageScaleMax_um_per_px, {},
+           "size of a pixel; without it lengths are in pixels"},
+          {"foreground", QueryType::kName, 0, 0, {"auto", "light", "dark"}, "what the objects are; default auto"},
+          {"channel", QueryType::kInteger, 0, 15, {}, "from 0; an image of several channels needs one"},
+          {"threshold", QueryType::kInteger, 0, 254, {}, "of the step `signal`; default by Otsu"},
+          {"pipeline", QueryType::kName, 0, 0, {"auto", "nuclei", "phase", "contours"}, "default auto"},
+          {"clahe", QueryType::kBoolean, 0, 0, {}, "even the local contrast first; default false"},
+          {"split", QueryType::kBoolean, 0, 0, {}, "nuclei: part touching objects; default true"},
+          {"area_min_px", QueryType::kInteger, 1, kObjectAreaMax_px, {}, "the smallest object; default by the picture"},
+          {"hole_max_px", QueryType::kInteger, 0, kObjectAreaMax_px, {}, "the largest hole that is filled; default by the picture"},
+          {"background_reach_px", QueryType::kInteger, 3, kImageSideMax_px, {},
+           "nuclei: wider than any object; default a quarter of the shorter side"},
+          {"window_radius_px", QueryType::kInteger, 1, 50, {}, "phase: of the local deviation; default 3"}};
+}
 
 http::Response post_analysis(Context& context, const Call& call) {
   NewAnalysis analysis;
@@ -105,6 +135,11 @@ http::Response created(Context& context, const Call& call, const NewAnalysis& an
   return response;
 }
 
+AnalysisRow with_job(Context& context, AnalysisRow row) {
+  if (row.kind == AnalysisKind::kComparison && row.has_source) row.has_source = static_cast<bool>(context.jobs.show(row.job_id));
+  return row;
+}
+
 http::Response listed(Context& context, const Call& call, AnalysisKind kind) {
   const std::size_t limit = call.query.integer("limit").value_or(kJobsPerPageDefault);
   const auto cursor = call.query.text("cursor");
@@ -115,7 +150,7 @@ http::Response listed(Context& context, const Call& call, AnalysisKind kind) {
   const auto page = context.jobs.store().analyses().list(kind, limit, cursor.value_or(""));
   if (!page) return failure(page.error(), call);
   Json items = Json::array();
-  for (const AnalysisRow& row : page->items) items.push_back(encode_analysis(row, false, context.config.base_path));
+  for (const AnalysisRow& row : page->items) items.push_back(encode_analysis(with_job(context, row), false, context.config.base_path));
   http::Response response =
       json_response(200, {{"items", std::move(items)}, {"next", page->next ? Json(*page->next) : Json(nullptr)}});
   if (page->next) set_next_link(context, call, response, "cursor", *page->next);
@@ -125,6 +160,7 @@ http::Response listed(Context& context, const Call& call, AnalysisKind kind) {
 http::Response removed(Context& context, const Call& call, AnalysisKind kind) {
   const Status gone = context.jobs.store().analyses().remove(kind, call.id());
   if (!gone) return failure(gone.error(), call);
+  if (context.worker) context.worker->drop(call.id());
   http::Response response;
   response.status = 204;
   return response;
@@ -145,29 +181,53 @@ http::Response get_analysis_objects(Context& context, const Call& call) {
   AnalysisStore& store = context.jobs.store().analyses();
   const auto row = store.find(AnalysisKind::kAnalysis, call.id());
   if (!row) return failure(row.error(), call);
+  // An analysis has one image and one set of options for ever.
+  const std::string tag = derived_tag(context, call, Digest{}, 0, row->id + " " + row->options_json);
+  if (auto settled = settled_by_tag(call, tag)) return std::move(*settled);
   const auto image = store.image(call.id());
   if (!image) return failure(image.error(), call);
   const auto objects = objects_of_picture(*image, decode_image_options(row->options_json), effort_of(context));
   if (!objects) return failure(as_body_error(objects.error()), call);
   const auto rows = shape_rows(*objects);
   if (!rows) return failure(as_body_error(rows.error()), call);
-  if (call.media == "text/csv") return csv_response(shape_csv(object_shape_columns(), *rows));
-  Json items = Json::array();
-  for (const ShapeRow& object : *rows) items.push_back(encode_row(object_shape_columns(), object));
-  return json_response(200, {{"items", std::move(items)}, {"next", nullptr}});
+  http::Response response;
+  if (call.media == "text/csv") {
+    response = csv_response(shape_csv(object_shape_columns(), *rows));
+  } else {
+    Json items = Json::array();
+    for (const ShapeRow& object : *rows) items.push_back(encode_row(object_shape_columns(), object));
+    response = json_response(200, {{"items", std::move(items)}, {"next", nullptr}});
+  }
+  stamp(response, tag);
+  return response;
+}
+
+http::Response get_analysis_steps(Context& context, const Call& call) {
+  const auto row = context.jobs.store().analyses().find(AnalysisKind::kAnalysis, call.id());
+  if (!row) return failure(row.error(), call);
+  return json_response(200, encode_steps(*row, context.config.base_path));
 }
 
 http::Response get_analysis_step(Context& context, const Call& call) {
   AnalysisStore& store = context.jobs.store().analyses();
   const auto row = store.find(AnalysisKind::kAnalysis, call.id());
   if (!row) return failure(row.error(), call);
+  // Known from the result: nothing is computed for a name that it does not have.
+  const Json steps = encode_steps(*row, context.config.base_path)["items"];
+  const std::string& wanted = call.request.path_params.at(1);
+  if (std::none_of(steps.begin(), steps.end(), [&](const Json& step) { return step["name"] == wanted; })) {
+    std::string names;
+    for (const Json& step : steps) names += (names.empty() ? "" : ", ") + step["name"].get<std::string>();
+    return failure({ErrorCode::kNotFound, names.empty() ? "this analysis has no result, so it has no steps"
+                                                        : "this analysis has no step of that name; there are " + names},
+                   call);
+  }
   // An analysis has one image and one set of options for ever.
-  const std::string& step = call.request.path_params.at(1);
-  const std::string tag = derived_tag(context, call, Digest{}, 0, row->id + " " + row->options_json + " " + step);
+  const std::string tag = derived_tag(context, call, Digest{}, 0, row->id + " " + row->options_json + " " + wanted);
   if (auto settled = settled_by_tag(call, tag)) return std::move(*settled);
   const auto image = store.image(call.id());
   if (!image) return failure(image.error(), call);
-  auto png = step_png(*image, decode_image_options(row->options_json), step, effort_of(context));
+  auto png = step_png(*image, decode_image_options(row->options_json), wanted, effort_of(context));
   if (!png) return failure(as_body_error(png.error()), call);
   http::Response response;
   response.headers.set("Content-Type", call.media);

@@ -1,4 +1,5 @@
 // Handlers of comparisons: a colony at a time against a picture that was sent.
+#include "engine/analysis/reason.hpp"
 #include "server/api/analysis_work.hpp"
 #include "server/api/api.hpp"
 #include "server/api/codec_analysis.hpp"
@@ -22,6 +23,20 @@ Result<Source> source_of(Context& context, const std::string& id) {
   return Source{std::move(*row), std::move(*image)};
 }
 
+// What the stored result says of the picture; what an older program stored calls all objects cells.
+ObjectFacts facts_of(const Json& result) {
+  ObjectFacts facts;
+  const std::string kind = result.value("object_kind", "cells");
+  for (const ObjectKind one : {ObjectKind::kCells, ObjectKind::kNuclei, ObjectKind::kRegions, ObjectKind::kObjects}) {
+    if (kind == name_of(one)) facts.kind = one;
+  }
+  const bool is_old = !result.contains("object_kind");
+  facts.count = result[is_old ? "cell_count" : "object_count"].get<std::uint64_t>();
+  facts.area_mean_px = result[is_old ? "cell_area_mean_px" : "object_area_mean_px"].get<double>();
+  if (!result["image"]["um_per_px"].is_null()) facts.um_per_px = result["image"]["um_per_px"].get<double>();
+  return facts;
+}
+
 Error gone_with(const char* pointer, Error error) {
   error.fields = {{pointer, error.message}};
   if (error.code == ErrorCode::kNotFound) error.code = ErrorCode::kInvalid;  // the resource is there, what it names is not
@@ -33,8 +48,8 @@ Result<Comparison> compare_again(Context& context, const AnalysisRow& row, const
   if (!found) return found.error();
   auto at = context.jobs.colony_at(row.job_id, Json::parse(row.options_json)["at_h"].get<double>());
   if (!at) return at.error();
-  return compare(std::move(*at), found->image, decode_image_options(found->row.options_json), effort,
-                 sweep);
+  return compare(std::move(*at), found->image, decode_image_options(found->row.options_json), decode_match_request(row.options_json),
+                 effort, sweep);
 }
 
 }  // namespace
@@ -42,7 +57,7 @@ Result<Comparison> compare_again(Context& context, const AnalysisRow& row, const
 AnalysisWorker::Outcome work_on(Context& context, const AnalysisRow& row, StopFlag stop) {
   const Effort effort{context.config.jobs.threads_per_job, stop};
   const auto failed = [](const Error& error) {
-    return AnalysisWorker::Outcome{{}, std::string(problem_row(problem_kind_of(error.code)).code), error.message};
+    return AnalysisWorker::Outcome{{}, std::string(problem_row(problem_kind_of(error.code)).code), reason_of(error)};
   };
   if (row.kind == AnalysisKind::kComparison) {
     const auto comparison = compare_again(context, row, effort, Sweep::kMake);
@@ -79,15 +94,19 @@ http::Response post_comparison(Context& context, const Call& call) {
   comparison.job_id = spec->job_id;
   comparison.analysis_id = spec->analysis_id;
   // Of a job that goes on: the moment as it is now, so that the figure is of the same colony later.
-  comparison.options_json = to_text({{"at_h", at->time_h}});
+  Json options = encode_match_request(spec->match);
+  options["at_h"] = at->time_h;
+  comparison.options_json = to_text(options);
   const Json stored = Json::parse(source->row.result_json);
   const Json& image = stored["image"];
   const std::int64_t pixels = image["width_px"].get<std::int64_t>() * image["height_px"].get<std::int64_t>();
+  const auto match = match_of(spec->match, facts_of(stored));
+  if (!match) return failure(match.error(), call);
   // Either may be the large one: a small picture of large cells asks for a large picture of the colony.
   const bool is_small = pixels <= kAnalysedAtOncePixelsMax && at->colony->cells().size() <= kComparedAtOnceCellsMax &&
-                        compared_px_estimate(*at->colony, stored["cell_area_mean_px"].get<double>()) <= kComparedAtOncePixelsMax;
+                        compared_px_estimate(*at->colony, *match) <= kComparedAtOncePixelsMax;
   if (is_small) {
-    const auto made = compare(std::move(*at), source->image, decode_image_options(source->row.options_json),
+    const auto made = compare(std::move(*at), source->image, decode_image_options(source->row.options_json), spec->match,
                               effort_of(context));
     if (!made) return failure(made.error(), call);
     comparison.result_json = to_text(encode_comparison(*made));
@@ -100,7 +119,8 @@ http::Response get_comparisons(Context& context, const Call& call) {
 }
 http::Response get_comparison(Context& context, const Call& call) {
   const auto row = context.jobs.store().analyses().find(AnalysisKind::kComparison, call.id());
-  return row ? json_response(200, encode_analysis(*row, true, context.config.base_path)) : failure(row.error(), call);
+  if (!row) return failure(row.error(), call);
+  return json_response(200, encode_analysis(with_job(context, *row), true, context.config.base_path));
 }
 http::Response delete_comparison(Context& context, const Call& call) {
   return removed(context, call, AnalysisKind::kComparison);

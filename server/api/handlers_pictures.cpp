@@ -69,13 +69,15 @@ http::Response get_image(Context& context, const Call& call) {
   if (const Status scale = read_scale(call.query, PictureSpec().width_px, spec); !scale)
     return failure(scale.error(), call);
   const bool is_tiff = call.media == "image/tiff";
-  if (is_tiff) {
-    std::vector<FieldError> errors;
-    for (const char* name : {"style", "colour_by", "lines", "scale_bar"}) {
-      if (call.query.has(name)) errors.push_back({name, "is not for image/tiff, which has every channel"});
-    }
-    if (!errors.empty()) return failure({ErrorCode::kInvalid, "query parameters are wrong", std::move(errors)}, call);
-  }
+  std::vector<FieldError> errors;
+  const auto refuse = [&](const char* name, bool has_meaning, const char* why) {
+    if (call.query.has(name) && !has_meaning) errors.push_back({name, is_tiff ? "is not for image/tiff, which has every channel" : why});
+  };
+  refuse("style", !is_tiff, "");
+  refuse("colour_by", !is_tiff && spec.style == PictureStyle::kShaded, "is for the style shaded alone");
+  refuse("lines", !is_tiff && spec.style == PictureStyle::kContours, "is for the style contours alone");
+  refuse("scale_bar", !is_tiff && spec.style != PictureStyle::kLabels, "is not for the style labels, whose every pixel is an id");
+  if (!errors.empty()) return failure({ErrorCode::kInvalid, "query parameters are wrong", std::move(errors)}, call);
   if (auto settled = settled_by_history(context, call)) return std::move(*settled);
   const auto at = context.jobs.colony_at(call.id(), call.query.number("at_h"));
   if (!at) return failure(at.error(), call);
@@ -91,13 +93,18 @@ http::Response get_image(Context& context, const Call& call) {
   return drawn ? bytes_response(call.media, std::move(png), tag) : failure(drawn.error(), call);
 }
 
+std::int64_t mesh_triangles_default(std::size_t cell_count) {
+  return std::clamp(kMeshTrianglesPerCellDefault * static_cast<std::int64_t>(cell_count), kMeshTrianglesDefaultMin, kServedMeshTrianglesMax);
+}
+
 http::Response get_mesh(Context& context, const Call& call) {
   MeshSpec spec;
-  spec.triangles_max = static_cast<std::int64_t>(call.query.integer("triangles_max").value_or(kMeshTrianglesDefault));
   spec.nuclei = call.query.boolean("nuclei", true);
   if (auto settled = settled_by_history(context, call)) return std::move(*settled);
   const auto at = context.jobs.colony_at(call.id(), call.query.number("at_h"));
   if (!at) return failure(at.error(), call);
+  const auto given = call.query.integer("triangles_max");
+  spec.triangles_max = given ? static_cast<std::int64_t>(*given) : mesh_triangles_default(at->colony->cells().size());
   const auto mesh = build_mesh(*at->colony, at->spec->params.contact.rule, spec, effort_of(context));
   if (!mesh) return failure(mesh.error(), call);
   auto glb = encode_glb(*mesh, *at->colony);

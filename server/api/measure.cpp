@@ -21,17 +21,18 @@ Result<LabelledColony> label_colony(const Colony& colony, const PictureSpec& spe
   out.top_um = frame->top_um;
   view = {};  // its heights are not needed beside the control
   Result<LabelImage> smooth = noise_free_control(colony, frame->width_px, frame->height_px, frame->um_per_px,
-                                                 frame->left_um, frame->top_um);
+                                                 frame->left_um, frame->top_um, effort.stop);
   if (!smooth) return smooth.error();
   out.without_noise = std::move(*smooth);
   throw_if_stopped(effort.stop);
   return out;
 }
 
-Result<LabelReport> measure_colony(const ColonyAt& at, const LabelledColony& image, const Effort& effort) {
+Result<LabelReport> measure_colony(const ColonyAt& at, const LabelledColony& image, const Effort& effort, ObjectKind objects) {
   LabelInput input;
   input.labels = &image.labels;
-  input.without_noise = &image.without_noise;
+  input.objects = objects;
+  if (objects == ObjectKind::kCells) input.without_noise = &image.without_noise;
   input.siblings = sibling_pairs(*at.colony);
   input.active = active_labels(*at.colony);
   input.control_seed = at.spec->seed;

@@ -23,6 +23,7 @@ struct LabelledColony {
 /// Of `spec` only the scale and the side limit count.
 Result<LabelledColony> label_colony(const Colony& colony, const PictureSpec& spec, const Effort& effort);
 
-Result<LabelReport> measure_colony(const ColonyAt& at, const LabelledColony& image, const Effort& effort);
+/// `objects`: what the labels are; nuclei have no control without noise, since they have none.
+Result<LabelReport> measure_colony(const ColonyAt& at, const LabelledColony& image, const Effort& effort, ObjectKind objects = ObjectKind::kCells);
 
 }  // namespace colony::server::api

@@ -74,17 +74,23 @@ Json colony_schema() {
 }
 
 Json neighbours_schema() {
-  return strict_object({{"interior_count", count()},
-                        {"other_count", count()},
-                        {"classes", list(strict_object({{"sides", count()},
-                                                        {"count", count()},
-                                                        {"share", number()},
-                                                        {"gibson_share", number()}}))},
-                        {"sides_mean", number()},
-                        {"difference_max", number()},
-                        {"chi_square", nullable_number()},
-                        {"degrees", count()},
-                        {"p_value", nullable_number()}});
+  Json sides = {{"other_count", count()},
+                {"classes", list(strict_object({{"sides", count()},
+                                                {"count", count()},
+                                                {"share", number()},
+                                                {"gibson_share", number()}}))},
+                {"sides_mean", number()},
+                {"difference_max", number()},
+                {"chi_square", nullable_number()},
+                {"degrees", count()},
+                {"p_value", nullable_number()}};
+  Json closed = sides;
+  closed["hole_max_px"] = closed["hole_count"] = closed["hole_px"] = count();
+  sides["interior_count"] = count();
+  sides["holes_given"] = described(strict_object(std::move(closed)),
+                                   "the same with shut-in holes of at most half a mean cell given to the cells about them: where cells meet they "
+                                   "leave holes of a few pixels, which Gibson's table does not know");
+  return strict_object(std::move(sides));
 }
 
 Json report_properties() {
@@ -102,7 +108,8 @@ Json report_properties() {
       numbers({"share", "apart_area_cv", "apart_circularity_sd", "other_area_cv", "other_circularity_sd"});
   apart["apart_count"] = apart["other_count"] = count();
   const Json lines = {{"walls", reference("MeasuredLine")}, {"outline", reference("MeasuredLine")}};
-  Json control = {{"name", {{"enum", {"without_noise", "hexagonal", "random_discs"}}}}};
+  Json control = {{"name", {{"enum", {"without_noise", "hexagonal", "random_discs"}}}},
+                  {"placement", {{"enum", {"same_places", "touching", "spread"}}}}};
   control.update(lines);
   return {{"um_per_px", nullable_number()},
           {"cell_count", count()},
@@ -112,11 +119,14 @@ Json report_properties() {
           {"findings", reference("Findings")},
           {"fractal", strict_object(lines)},
           {"controls", list(strict_object(std::move(control)))},
+          {"object_cover", described(number(), "share of their convex hull that the labels take; below 0.7 controls are spread over it")},
           {"colony", colony_schema()},
           {"cells", strict_object(std::move(cells))},
           {"neighbours", neighbours_schema()},
           {"sibling_straightness", or_null(straightness)},
-          {"rings", list(strict_object(std::move(ring)))},
+          {"rings", described(list(strict_object(std::move(ring))),
+                              "of equal width from the middle to the farthest cell centre; pixels beyond it, the outer halves of the outermost cells, "
+                              "are in none")},
           {"apart", strict_object(std::move(apart))}};
 }
 
@@ -141,7 +151,8 @@ Json packing_schema() {
 }
 
 Json growth_schema() {
-  return {{"oneOf", Json::array({strict_object({{"exponential", phase("doubling_time_h")},
+  return {{"oneOf", Json::array({strict_object({{"lag", phase("cell_count")},
+                                                {"exponential", phase("doubling_time_h")},
                                                 {"linear_radius", phase("speed_um_per_h")},
                                                 {"plateau", phase("cell_count")},
                                                 {"relative_sd", number()},

@@ -22,8 +22,17 @@ void AnalysisWorker::nudge() {
   changed_.notify_one();
 }
 
+void AnalysisWorker::drop(const std::string& id) {
+  const std::lock_guard lock(mutex_);
+  if (running_id_ == id) give_up_ = true;
+}
+
 void AnalysisWorker::stop() {
-  stop_ = true;
+  {
+    const std::lock_guard lock(mutex_);
+    stop_ = true;
+    give_up_ = true;
+  }
   nudge();
   if (thread_.joinable()) thread_.join();
 }
@@ -54,10 +63,18 @@ bool AnalysisWorker::work_one(bool& refused) {
   }
   if (!*taken) return false;
   const AnalysisRow& row = **taken;
+  {
+    const std::lock_guard lock(mutex_);
+    running_id_ = row.id;
+    give_up_ = stop_.load();
+  }
+  // Deleted between being taken and being known to drop(): that is seen here, every later deletion by drop().
+  if (const auto there = store_.find(row.kind, row.id); !there && there.error().code == ErrorCode::kNotFound) return true;
   Outcome outcome;
   try {
-    outcome = work_(row, &stop_);
+    outcome = work_(row, &give_up_);
   } catch (const Stopped&) {
+    if (!stop_) return true;  // it was deleted
     (void)store_.put_back(row.analysis_key);  // if not: the next start finds it running, and tries it again
     return false;
   } catch (const std::exception& error) {

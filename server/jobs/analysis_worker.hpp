@@ -1,6 +1,6 @@
 // analysis_worker: one thread that works off the queued analyses and comparisons of the store, oldest first.
 // Promise: what was running when the process died is tried again, kAnalysisTriesMax times at most; what stop() interrupts is put back and
-//          costs no try. A storage error is waited out.
+//          costs no try. What is deleted while it is worked on is given up. A storage error is waited out.
 // Why one: an analysis may take more than a gigabyte; two would double that, and the colonies need the cores.
 // Threads: every function from any thread; stop() once.
 #pragma once
@@ -10,6 +10,7 @@
 #include <condition_variable>
 #include <functional>
 #include <mutex>
+#include <string>
 #include <thread>
 
 #include "engine/base/stop.hpp"
@@ -35,6 +36,8 @@ class AnalysisWorker {
   Status start();
   /// Something was queued.
   void nudge();
+  /// It was deleted: if it is the one under way, that work ends. Called after the store has removed it.
+  void drop(const std::string& id);
   /// Ends the work under way and the thread.
   void stop();
 
@@ -46,7 +49,9 @@ class AnalysisWorker {
   AnalysisStore& store_;  // synchronises itself
   const Work work_;
   std::atomic<bool> stop_{false};
-  std::mutex mutex_;  // guards nudged_
+  std::atomic<bool> give_up_{false};  // what the work under way polls: stop_, or its row is gone
+  std::mutex mutex_;  // guards nudged_, running_id_ and the writes of give_up_
+  std::string running_id_;
   std::condition_variable changed_;
   bool nudged_ = true;
   std::thread thread_;

@@ -47,6 +47,7 @@ struct AnalysisRow {
   std::string media_type;
   std::uint64_t image_bytes = 0;
   std::string job_id, analysis_id;
+  bool has_source = true;  // of a comparison: its analysis is still there
   std::string result_json;  // empty: none (yet); never in a list
   int try_count = 0;        // how often a worker took it
 };

@@ -16,7 +16,8 @@ constexpr std::array<std::string_view, 4> kStateNames = {"queued", "running", "s
 // `result` last: a list leaves it out, and what is before it can be read without it.
 #define COLONY_ANALYSIS_COLUMNS                                                                             \
   "SELECT analysis_key, id, kind, name, state, failure_code, detail, created_at, finished_at, options, media_type," \
-  " image_bytes, job_id, analysis_id, try_count"
+  " image_bytes, job_id, analysis_id, try_count,"                                                            \
+  " kind = 'analysis' OR EXISTS (SELECT 1 FROM analysis AS source WHERE source.id = analysis.analysis_id)"
 
 template <std::size_t kCount>
 int index_in(const std::array<std::string_view, kCount>& names, const std::string& text) {
@@ -43,7 +44,8 @@ AnalysisRow row_at(const Statement& row, bool with_result) {
   out.job_id = row.text(12);
   out.analysis_id = row.text(13);
   out.try_count = static_cast<int>(row.integer(14));
-  if (with_result) out.result_json = row.text(15);
+  out.has_source = row.integer(15) != 0;
+  if (with_result) out.result_json = row.text(16);
   return out;
 }
 

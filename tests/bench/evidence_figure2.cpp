@@ -13,7 +13,8 @@ std::string value_of(const MeasuredLine& line) { return line.dimensions ? with_e
 
 void print_row(const CountedPicture& picture, const char* name, MeasuredLine LineReport::* which, const LineFinding& finding) {
   const MeasuredLine& line = picture.lines.*which;
-  std::printf("| %s, %d cells | %s | ", picture.name.c_str(), static_cast<int>(picture.cell_count), name);
+  std::printf("| %s, %d %s, cover %.2f | %s | ", picture.name.c_str(), static_cast<int>(picture.cell_count), std::string(name_of(picture.objects)).c_str(),
+              picture.object_cover, name);
   if (line.dimensions) {
     std::printf("%s | %.3f | %d to %d | %.2f to %.2f, %.2f of %.2f | %s |", value_of(line).c_str(), line.dimensions->capacity.r2,
                 static_cast<int>(line.dimensions->side_min_px), static_cast<int>(line.dimensions->side_max_px), finding.slopes.first,

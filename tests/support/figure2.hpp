@@ -21,6 +21,8 @@ struct CountedPicture {
   std::vector<ControlReport> controls;
   LineFindings findings;
   std::vector<std::string> verdict;
+  ObjectKind objects = ObjectKind::kCells;
+  double object_cover = 0.0;
 };
 
 /// Preset `paper`, grown to 180 cells.
@@ -37,15 +39,15 @@ inline CountedPicture simulated_180(Seed seed, std::int64_t width_px, int thread
   auto report = server::api::measure_colony(at, *image, effort);
   CHECK(static_cast<bool>(report));
   return {"simulated, seed " + std::to_string(seed), report->cell_count, report->cell_area_mean_px, report->lines, report->controls, report->findings,
-          report->verdict};
+          report->verdict, report->objects, report->object_cover};
 }
 
 struct RealPicture {
   const char* file;
   Pipeline pipeline;
 };
-/// Actin shows borders of cells, so its regions are what can be counted; the others are left to choose.
-inline constexpr RealPicture kRealPictures[] = {{"ht29_nuclei_d0.tif", Pipeline::kAuto},
+/// Of the first it is known that they are nuclei. Actin shows borders of cells, so its regions are what can be counted; the others are left to choose.
+inline constexpr RealPicture kRealPictures[] = {{"ht29_nuclei_d0.tif", Pipeline::kNuclei},
                                                 {"ht29_actin_d2.tif", Pipeline::kPhase},
                                                 {"phantast_demo_colony_edge.tif", Pipeline::kAuto},
                                                 {"h3122_clonogenic_frame01.tif", Pipeline::kAuto},
@@ -59,8 +61,8 @@ inline std::optional<CountedPicture> real_picture(const RealPicture& picture, in
   options.pipeline = picture.pipeline;
   auto measured = server::api::measure_picture(*file, options, {threads, nullptr});
   CHECK(static_cast<bool>(measured));
-  return CountedPicture{picture.file, measured->cell_count, measured->cell_area_mean_px, measured->lines, measured->controls, measured->findings,
-                        measured->verdict};
+  return CountedPicture{picture.file, measured->object_count, measured->object_area_mean_px, measured->lines, measured->controls, measured->findings,
+                        measured->verdict, measured->objects, measured->object_cover};
 }
 
 }  // namespace colony::testing

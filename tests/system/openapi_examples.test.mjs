@@ -143,7 +143,9 @@ test('the examples of openapi.json', async (t) => {
       for (const parameter of (operation.parameters ?? []).map((one) => contract.resolve(one))) {
         if (!('example' in parameter) || parameter.in === 'path') continue;
         const text = [parameter.example].flat().join(',');
-        const query = parameter.in === 'query' ? `?${parameter.name}=${encodeURIComponent(text)}` : '';
+        // Lines are drawn in one style only.
+        const beside = operation.operationId === 'drawImage' && parameter.name === 'lines' ? '&style=contours' : '';
+        const query = parameter.in === 'query' ? `?${parameter.name}=${encodeURIComponent(text)}${beside}` : '';
         const [body] = bodies(operation);
         const image = method === 'POST' && !body && contract.resolve(operation.requestBody).content['image/png'];
         const headers = {

@@ -100,7 +100,9 @@ test('a job is seen, measured and compared', async (t) => {
     const made = await server.post('/v1/comparisons', { job_id: job.id, analysis_id: analysis.id, name: 'discs' });
     assert.equal(made.status, 201, made.text);
     const { simulated, real } = made.json.result;
-    assert.ok(Math.abs(simulated.cell_area_mean_px / real.cell_area_mean_px - 1) < 0.02);
+    assert.ok(Math.abs(simulated.object_area_mean_px / real.object_area_mean_px - 1) < 0.02);
+    assert.equal(simulated.object_kind, 'nuclei', 'nuclei with nuclei');
+    assert.match(made.json.result.verdict[0], /^Matched by area: a nucleus of the colony/);
     assert.equal(made.headers.location, made.json.links.self);
     const figure = await server.get(made.json.links.figure);
     assert.ok(pngFacts(figure.body).width > 1000);
@@ -118,6 +120,11 @@ test('a job is seen, measured and compared', async (t) => {
     assert.doesNotMatch(html, /(src|href)\s*=\s*"(?!data:)/i, 'nothing is loaded from anywhere');
     assert.doesNotMatch(html, /<script|@import|url\(/i);
     assert.equal(html.match(/<svg/g).length, html.match(/<\/svg>/g).length);
+    const half = job.progress.time_h / 2;
+    assert.equal((await colony(server, ['report', job.id, '--at-h', String(half), '-o', page])).code, 0);
+    const then = (await server.get(`${base}/analysis?at_h=${half}`)).json;
+    assert.ok(then.cell_count < 24);
+    assert.match(readFileSync(page, 'utf8'), new RegExp(`<th>digest</th><td><code>${then.digest}`), 'the page says of which moment it is');
     const picture = join(folder, 'discs.png');
     writeFileSync(picture, discs(6, 9));
     const analyzed = await colony(server, ['analyze', picture, '--pipeline', 'nuclei', '--steps', join(folder, 'steps')]);
@@ -129,11 +136,18 @@ test('a job is seen, measured and compared', async (t) => {
     const compared = await colony(server, ['compare', job.id, id, '--figure', join(folder, 'figure.png')]);
     assert.equal(compared.code, 0, compared.err);
     assert.ok(pngFacts(readFileSync(join(folder, 'figure.png'))).height > 1000);
-    assert.equal((await colony(server, ['measure', job.id])).code, 0);
+    const measured = await colony(server, ['measure', job.id, '--um-per-px', '0.2']);
+    assert.equal(measured.code, 0, measured.err);
+    assert.match(measured.out, /interior cells/, 'sides, held against Gibson\'s table');
     const objects = join(folder, 'objects.csv'), sheet = join(folder, 'analysis.html');
     assert.equal((await colony(server, ['analyze', picture, '--objects', objects, '--html', sheet])).code, 0);
     assert.equal(readFileSync(objects, 'utf8').trim().split('\r\n').length, 37);
     assert.match(readFileSync(sheet, 'utf8'), /Against the threshold/);
+    assert.match((await colony(server, ['analysis', id.slice(-8)])).out, /objects: 36/);
+    assert.equal((await colony(server, ['delete-analysis', id.slice(-8)])).code, 0);
+    const orphan = (await server.get('/v1/comparisons')).json.items[0];
+    assert.equal(orphan.links.figure, null);
+    assert.equal((await colony(server, ['delete-comparison', orphan.id])).code, 0);
     assert.match((await colony(server, ['lineage', job.id])).out, /;\n$/);
     assert.equal((await colony(server, ['mesh', job.id, '-o', join(folder, 'm.glb')])).code, 0);
     const text = join(folder, 'text.png');
@@ -166,7 +180,7 @@ test('bad pictures are refused with a reason, and nothing is kept', async (t) =>
     assert.equal((await sendPicture(server, good, '', type)).status, 415, type);
   }
   assert.equal((await sendPicture(server, good, '', 'image/jpeg')).status, 422);
-  for (const query of ['?channel=7', '?um_per_px=0', '?threshold=255', '?pipeline=magic', '?foreground=grey', '?colour=1']) {
+  for (const query of ['?channel=7', '?um_per_px=0', '?threshold=255', '?pipeline=magic', '?foreground=grey', '?colour=1', '?split=2', '?window_radius_px=51']) {
     assert.equal((await sendPicture(server, good, query)).status, 422, query);
   }
   const large = await server.request('POST', '/v1/analyses', { body: Buffer.alloc(33_554_433), headers: { 'Content-Type': 'image/png' } });

@@ -1,4 +1,4 @@
-// The handlers of pictures: what is measured of a colony, pictures that are sent, comparisons of the two.
+// The handlers of pictures: what is measured of a colony, pictures that are sent.
 #include <algorithm>
 #include <string>
 #include <thread>
@@ -8,41 +8,18 @@
 #include <gtest/gtest.h>
 
 #include "server/api/analyse.hpp"
-#include "server/api/compare.hpp"
 #include "server/api/shape_table.hpp"
-#include "tests/support/image_files.hpp"
-#include "tests/unit/api_support.hpp"
+#include "tests/unit/picture_support.hpp"
 
 namespace colony::server::testing {
 namespace {
 
 using api::Json;
+using ::testing::AnyOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::StartsWith;
-
-/// Light discs on a dark ground, in a square of tiles: `side` of them a row, each `radius` large, 4 radii apart.
-std::string discs_png(int side, int radius) {
-  const int size = 4 * radius * side;
-  std::vector<std::uint8_t> rows(static_cast<std::size_t>(size) * static_cast<std::size_t>(size), 20);
-  for (int y = 0; y < size; ++y) {
-    for (int x = 0; x < size; ++x) {
-      const int dx = x % (4 * radius) - 2 * radius, dy = y % (4 * radius) - 2 * radius;
-      if (dx * dx + dy * dy <= radius * radius) rows[static_cast<std::size_t>(y * size + x)] = 200;
-    }
-  }
-  return colony::testing::png_file(size, size, {}, rows);
-}
-
-std::string plain_png(int width, int height, std::uint8_t level) {
-  return colony::testing::png_file(width, height, {},
-                                   std::vector<std::uint8_t>(static_cast<std::size_t>(width * height), level));
-}
-
-http::Response send_picture(ApiFixture& fixture, const std::string& bytes, const std::string& query = "",
-                            const std::string& type = "image/png") {
-  return fixture.ask("POST", "/v1/analyses" + query, {{"Content-Type", type}}, bytes);
-}
 
 TEST(JobPictures, HaveTheirTypes) {
   ApiFixture fixture;
@@ -65,6 +42,21 @@ TEST(JobPictures, HaveTheirTypes) {
   EXPECT_THAT(faults(few), ElementsAre("triangles_max"));
 }
 
+TEST(JobPictures, TakeWhatHasAMeaningForTheStyle) {
+  ApiFixture fixture;
+  for (const char* query : {"style=shaded&colour_by=age&scale_bar=false", "style=contours&lines=colony&scale_bar=true", "style=phase&scale_bar=false"}) {
+    EXPECT_EQ(fixture.get(kJob + "/image?width_px=64&" + query).status, 200) << query;
+  }
+}
+
+TEST(JobPictures, AMeshWithoutAWishHasTrianglesForEveryCell) {
+  EXPECT_EQ(api::mesh_triangles_default(0), 200'000);
+  EXPECT_EQ(api::mesh_triangles_default(500), 200'000);
+  EXPECT_EQ(api::mesh_triangles_default(7303), 2'921'200);
+  EXPECT_GE(api::mesh_triangles_default(20'000), 200 * 20'000);  // at least what each cell needs
+  EXPECT_EQ(api::mesh_triangles_default(1'000'000), 4'000'000);
+}
+
 TEST(JobAnalysis, HasItsControlsBesideIt) {
   ApiFixture fixture;
   auto response = fixture.get(kJob + "/analysis?width_px=512");
@@ -79,6 +71,8 @@ TEST(JobAnalysis, HasItsControlsBesideIt) {
   EXPECT_LT(d0["value"].get<double>(), 2.0);
   EXPECT_EQ(d0["range_px"].size(), 2u);
   EXPECT_FALSE(json["verdict"].empty());
+  for (const Json& sentence : json["verdict"]) EXPECT_THAT(sentence.get<std::string>(), Not(AnyOf(HasSubstr("image: "), HasSubstr("areas: "))));
+  EXPECT_EQ(json["neighbours"]["holes_given"]["classes"].size(), json["neighbours"]["classes"].size());
   EXPECT_TRUE(json["packing"]["reason"].is_null());
   EXPECT_EQ(json["findings"]["walls"]["finding"], "crossover");
   EXPECT_THAT(json["verdict"][0].get<std::string>(), HasSubstr("a crossover, not scaling"));
@@ -170,8 +164,8 @@ TEST(Analyses, CountDrawnDiscsAndKeepThem) {
     EXPECT_NEAR(rows[i]["walls"]["d0"]["value"].get<double>(), result["fractal"]["walls"]["d0"]["value"].get<double>(), 0.1);
   }
   const std::string words = result["verdict"].dump();
-  EXPECT_THAT(words, HasSubstr("the cell walls could be counted at " + std::to_string(rows.size()) + " of"));
-  EXPECT_THAT(words, HasSubstr("What follows for the cell walls"));
+  EXPECT_THAT(words, HasSubstr("the outlines of the nuclei could be counted at " + std::to_string(rows.size()) + " of"));
+  EXPECT_THAT(words, HasSubstr("What follows for the outlines of the nuclei"));
   // Each object a line, in both forms.
   auto table = fixture.get(made["links"]["objects"].get<std::string>(), {{"Accept", "text/csv"}});
   const auto lines = split_lines(table.body, "\r\n");
@@ -185,6 +179,14 @@ TEST(Analyses, CountDrawnDiscsAndKeepThem) {
   EXPECT_EQ(fixture.get(self + "x/objects").status, 404);
   auto absent = fixture.get(self + "/steps/dream");
   EXPECT_EQ(absent.status, 404);
+  EXPECT_THAT(json_of(absent)["detail"].get<std::string>(), HasSubstr("there are grey, "));
+  auto steps = fixture.get(made["links"]["steps"].get<std::string>());
+  ASSERT_EQ(steps.status, 200) << steps.body;
+  const Json told = json_of(steps)["items"];
+  ASSERT_EQ(told.size(), made["result"]["steps"].size());
+  EXPECT_EQ(told[0]["name"], "grey");
+  EXPECT_FALSE(told[0]["text"].get<std::string>().empty());
+  EXPECT_EQ(fixture.get(told[0]["href"].get<std::string>()).status, 200);
   EXPECT_EQ(fixture.ask("DELETE", self).status, 204);
   EXPECT_EQ(fixture.get(self).status, 404);
 }
@@ -217,7 +219,10 @@ TEST(Analyses, TakePicturesOnlyAndSayWhy) {
   for (const Case& one : cases) {
     auto refused = send_picture(fixture, one.bytes);
     EXPECT_EQ(refused.status, one.status) << one.what << refused.body;
-    EXPECT_GT(json_of(refused)["detail"].get<std::string>().size(), 10u) << one.what;
+    const std::string detail = json_of(refused)["detail"];
+    EXPECT_GT(detail.size(), 10u) << one.what;
+    EXPECT_THAT(detail, Not(AnyOf(StartsWith("image:"), StartsWith("threshold:")))) << one.what;
+    EXPECT_THAT(faults(refused), ElementsAre("")) << one.what;  // all of the body
   }
   auto channel = send_picture(fixture, picture, "?channel=3");
   EXPECT_THAT(faults(channel), ElementsAre("channel"));
@@ -232,6 +237,9 @@ TEST(Analyses, BeyondTheLimitAreWorkedOnLater) {
   ASSERT_EQ(response.status, 202) << response.body;
   const std::string self = json_of(response)["links"]["self"];
   EXPECT_EQ(json_of(response)["state"], "queued");
+  auto none = fixture.get(self + "/steps");
+  EXPECT_TRUE(json_of(none)["items"].empty());
+  EXPECT_EQ(fixture.get(self + "/steps/grey").status, 404);  // nothing is computed for a row that waits
   ASSERT_TRUE(fixture.api().start());
   Json row;
   for (;;) {  // the test's own deadline is that of ctest
@@ -244,67 +252,41 @@ TEST(Analyses, BeyondTheLimitAreWorkedOnLater) {
   EXPECT_EQ(row["result"]["segmentation"]["object_count"], 51 * 51);
 }
 
-TEST(Comparisons, MatchThePixelsOfACell) {
+TEST(Analyses, TakeTheChoicesOfTheSegmentation) {
   ApiFixture fixture;
-  auto sent = send_picture(fixture, discs_png(6, 9), "?pipeline=nuclei");
-  const Json analysis = json_of(sent);
-  const Json body = {{"job_id", kJobId}, {"analysis_id", analysis["id"]}};
-  auto response = fixture.post("/v1/comparisons", api::to_text(body));
-  ASSERT_EQ(response.status, 201) << response.body;
-  const Json made = json_of(response);
-  const double simulated = made["result"]["simulated"]["cell_area_mean_px"];
-  const double real = made["result"]["real"]["cell_area_mean_px"];
-  EXPECT_NEAR(simulated / real, 1.0, 0.02);
-  EXPECT_EQ(made["result"]["simulated"]["controls"].size(), 3u);
-  EXPECT_EQ(made["result"]["real"]["controls"].size(), 2u);
-  const std::string words = made["result"]["verdict"].dump();
-  EXPECT_THAT(words, HasSubstr("The cell walls: no comparison: the colony's has no figures"));  // six small cells: too few box sides
-  EXPECT_THAT(words, HasSubstr("The picture. What follows for the cell walls"));
-  EXPECT_EQ(made["result"]["real"]["threshold_sweep"]["rows"].size(), 9u);
-  auto figure = fixture.get(made["links"]["figure"].get<std::string>());
-  EXPECT_EQ(figure.status, 200);
-  EXPECT_THAT(figure.body, StartsWith("\x89PNG"));
-
-  auto wrong = fixture.post("/v1/comparisons", R"({"job_id":"x","at_h":-1,"colour":1})");
-  EXPECT_EQ(wrong.status, 422);
-  EXPECT_THAT(faults(wrong), ElementsAre("/at_h", "/colour", "/analysis_id"));
-  auto nobody = fixture.post("/v1/comparisons", R"({"job_id":"x","analysis_id":"y"})");
-  EXPECT_THAT(faults(nobody), ElementsAre("/analysis_id"));
-  auto no_job = fixture.post("/v1/comparisons",
-                             api::to_text({{"job_id", "x"}, {"analysis_id", analysis["id"]}}));
-  EXPECT_THAT(faults(no_job), ElementsAre("/job_id"));
-}
-
-TEST(Comparisons, OfALargeColonyPictureAreWorkedOnLaterThoughThePhotographIsSmall) {
-  ApiFixture fixture;
-  // One ring that encloses half a million pixels: at so many a cell, six cells take millions.
-  std::vector<std::uint8_t> rows(900 * 900, 255);
-  for (int y = 0; y < 900; ++y) {
-    for (int x = 0; x < 900; ++x) {
-      const int distance2 = (x - 450) * (x - 450) + (y - 450) * (y - 450);
-      if (distance2 <= 421 * 421 && distance2 >= 419 * 419) rows[static_cast<std::size_t>(900 * y + x)] = 0;
+  // Two discs that touch, and a speck.
+  std::vector<std::uint8_t> rows(120 * 80, 20);
+  for (int y = 0; y < 80; ++y) {
+    for (int x = 0; x < 120; ++x) {
+      const auto in = [&](int cx, int cy, int r) { return (x - cx) * (x - cx) + (y - cy) * (y - cy) <= r * r; };
+      if (in(40, 40, 14) || in(64, 40, 14) || in(100, 20, 3)) rows[static_cast<std::size_t>(120 * y + x)] = 200;
     }
   }
-  auto sent = send_picture(fixture, colony::testing::png_file(900, 900, {}, rows));
-  ASSERT_EQ(sent.status, 201) << sent.body;
-  const Json analysis = json_of(sent);
-  auto response = fixture.post("/v1/comparisons", api::to_text({{"job_id", kJobId}, {"analysis_id", analysis["id"]}}));
-  ASSERT_EQ(response.status, 202) << response.body;
-  EXPECT_EQ(json_of(response)["state"], "queued");
-}
-
-TEST(Comparisons, TheEstimateOfTheirSizeIsThatOfTheFrame) {
-  const FakeJobs jobs;
-  Colony colony(jobs.spec.params);
-  for (const Event& event : jobs.history) colony.apply(event);
-  PictureSpec spec;
-  spec.um_per_px = *api::matched_scale(colony, 4000.0, {});
-  const auto frame = frame_of(colony, spec);
-  ASSERT_TRUE(frame);
-  const auto pixels = static_cast<double>(frame->width_px * frame->height_px);
-  const auto estimate = static_cast<double>(api::compared_px_estimate(colony, 4000.0));
-  EXPECT_GT(estimate, 0.6 * pixels);
-  EXPECT_LT(estimate, 1.3 * pixels);
+  const std::string picture = colony::testing::png_file(120, 80, {}, rows);
+  const auto count = [&](const std::string& query) {
+    auto sent = send_picture(fixture, picture, "?pipeline=nuclei" + query);
+    EXPECT_EQ(sent.status, 201) << sent.body;
+    return json_of(sent)["result"]["segmentation"]["object_count"].get<int>();
+  };
+  EXPECT_EQ(count("&area_min_px=9"), 3);
+  EXPECT_EQ(count("&area_min_px=9&split=false"), 2);
+  EXPECT_EQ(count("&area_min_px=100"), 2);
+  auto sent = send_picture(fixture, picture, "?pipeline=nuclei&window_radius_px=5&hole_max_px=500&background_reach_px=60");
+  const Json made = json_of(sent), options = made["options"];
+  EXPECT_EQ(made["result"]["segmentation"]["background_reach_px"], 60);
+  EXPECT_EQ(options["window_radius_px"], 5);
+  EXPECT_EQ(options["hole_max_px"], 500);
+  EXPECT_EQ(options["background_reach_px"], 60);
+  EXPECT_TRUE(options["split"].get<bool>());
+  for (const char* query : {"?window_radius_px=0", "?window_radius_px=51", "?area_min_px=0", "?hole_max_px=-1", "?background_reach_px=2", "?split=1"}) {
+    EXPECT_EQ(send_picture(fixture, picture, query).status, 422) << query;
+  }
+  // What an older program stored knows none of them.
+  const api::ImageOptions old = api::decode_image_options(
+      R"({"um_per_px":null,"channel":null,"pipeline":"auto","foreground":"auto","threshold":null,"clahe":false})");
+  EXPECT_TRUE(old.split);
+  EXPECT_EQ(old.window_radius_px, 3);
+  EXPECT_FALSE(old.area_min_px);
 }
 
 TEST(Ink, EnclosesItsCells) {

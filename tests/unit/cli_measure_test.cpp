@@ -26,6 +26,8 @@ const std::string kAnalysis = "0190aaaa-bbbb-7ccc-8ddd-00000000abcd";
 json dimension(double value) { return {{"value", value}, {"se", 0.037}, {"r2", 0.993}, {"range_px", {3, 96}}}; }
 json line(double value, bool is_crossover) {
   return {{"d0", dimension(value)},
+          {"d0_smallest_cover", dimension(value + 0.01)},
+          {"d1", dimension(value - 0.01)},
           {"crossover", {{"found", is_crossover}}},
           {"curve", {{{"side_px", 3}, {"count_mean", 900.5}}, {{"side_px", 96}, {"count_mean", 8.25}}}},
           {"reason", nullptr}};
@@ -37,9 +39,14 @@ json measured_lines() {
 }
 json job_analysis() {
   json out = measured_lines();
-  out.update(json{{"time_h", 200.0}, {"cell_count", 180}, {"colony", {{"area_um2", 1.0}}}, {"cells", json::object()},
+  const json classes = {{{"sides", 6}, {"count", 50}, {"share", 0.46}, {"gibson_share", 0.464}}};
+  json seen = {{"classes", classes}, {"other_count", 3}, {"sides_mean", 5.5}, {"difference_max", 0.1}, {"chi_square", 9.0}, {"degrees", 4}, {"p_value", 0.06}};
+  json given = seen;
+  given.update(json{{"hole_count", 7}, {"hole_px", 90}, {"hole_max_px", 30}});
+  seen.update(json{{"interior_count", 50}, {"holes_given", given}});
+  out.update(json{{"time_h", 200.0}, {"last_seq", 9}, {"digest", "abc123"}, {"um_per_px", 0.5}, {"px_per_cell_diameter", 30.0}, {"cell_count", 180}, {"colony", {{"area_um2", 1.0}}}, {"cells", json::object()},
                   {"apart", json::object()}, {"packing", json::object()}, {"growth", json::object()},
-                  {"neighbours", {{"classes", {{{"sides", 6}, {"count", 50}, {"share", 0.46}, {"gibson_share", 0.464}}}}}}});
+                  {"sibling_straightness", json::object()}, {"rings", json::array()}, {"neighbours", seen}});
   return out;
 }
 json picture_analysis() {
@@ -105,6 +112,11 @@ TEST_F(Cli, AnalyzeTellsTheChoicesTheSweepAndWhatFollows) {
   EXPECT_THAT(out(), HasSubstr("  threshold 60: walls 1.31 (se 0.037, boxes of 3 to 96 px, a crossover), outline none: has no foreground\n"));
   EXPECT_THAT(out(), HasSubstr("- The cell walls: a crossover"));
   EXPECT_EQ(read_file("o.csv"), "object_id,area_px\r\n1,9\r\n");
+  const std::size_t before = server.requests().size();
+  EXPECT_EQ(run({"analyze", path("p.tif"), "--no-split", "--area-min-px", "9", "--hole-max-px", "2000", "--background-reach-px", "60", "--window-radius-px", "5"}),
+            0) << err();
+  EXPECT_EQ(server.requests().at(before).line(),
+            "POST /v1/analyses?area_min_px=9&hole_max_px=2000&background_reach_px=60&window_radius_px=5&split=false HTTP/1.1");
   const std::string page = read_file("a.html");
   EXPECT_THAT(page, HasSubstr("Against the threshold"));
   EXPECT_THAT(page, HasSubstr("<td class=n>60</td><td class=n>1.310</td>"));
@@ -116,7 +128,7 @@ TEST_F(Cli, CompareShowsBothSidesAndKeepsTheFigure) {
   FakeServer server([](const FakeRequest& request, const FakeConnection& to) {
     if (request.line().find("/figure") != std::string::npos) return to.send(test::answer(200, "image/png", kPng));
     json side = measured_lines();
-    side.update(json{{"cell_count", 180}, {"cell_area_mean_px", 1963.4}});
+    side.update(json{{"object_kind", "regions"}, {"object_count", 180}, {"object_area_mean_px", 1963.4}});
     const json result = {{"simulated", side}, {"real", side}, {"verdict", {"no difference that box counting could show"}}};
     to.send(json_answer(201, json{{"id", "c-1"}, {"state", "succeeded"}, {"result", result}, {"links", {{"figure", "/v1/comparisons/c-1/figure"}}}}.dump()));
   });
@@ -124,10 +136,16 @@ TEST_F(Cli, CompareShowsBothSidesAndKeepsTheFigure) {
   EXPECT_EQ(run({"compare", kId, kAnalysis, "--at-h", "150.5", "--figure", path("f.png")}), 0) << err();
   EXPECT_EQ(json::parse(server.requests().at(0).body), (json{{"job_id", kId}, {"analysis_id", kAnalysis}, {"at_h", 150.5}}));
   EXPECT_EQ(read_file("f.png"), kPng);
-  EXPECT_THAT(out(), HasSubstr("comparison c-1\nsimulated, 180 cells of 1963 px\n"));
-  EXPECT_THAT(out(), HasSubstr("real, 180 cells"));
+  EXPECT_THAT(out(), HasSubstr("comparison c-1\nsimulated, 180 regions of 1963 px\n"));
+  EXPECT_THAT(out(), HasSubstr("real, 180 regions"));
   EXPECT_THAT(out(), HasSubstr("- no difference"));
   EXPECT_EQ(run({"compare", kId, kAnalysis, "--at-h", "soon"}), 2);
+  EXPECT_EQ(run({"compare", kId, kAnalysis, "--match", "object_area", "--cell-count", "317"}), 0) << err();
+  EXPECT_EQ(json::parse(server.requests().back().body),
+            (json{{"job_id", kId}, {"analysis_id", kAnalysis}, {"match", "object_area"}, {"cell_count", 317}}));
+  EXPECT_EQ(run({"compare", kId, kAnalysis, "--cell-count", "3.5"}), 2);
+  EXPECT_EQ(run({"compare", kId, kAnalysis, "--cell-area-px", "120.5"}), 0) << err();
+  EXPECT_EQ(json::parse(server.requests().back().body)["cell_area_px"], 120.5);
 }
 
 TEST_F(Cli, MeshAndCellsAreFiles) {

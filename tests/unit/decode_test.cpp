@@ -77,6 +77,19 @@ TEST(DecodePng, TransparencyIsBlendedOverWhiteAndSaidSo) {
   }
 }
 
+TEST(DecodePng, AnAnimationSaysThatOnlyItsFirstPictureWasRead) {
+  using std::string_literals::operator""s;
+  const std::string png = grey_png(9, 5);
+  EXPECT_THAT(read(png).notes, IsEmpty());
+  // After the header's chunk, which ends at byte 33: two pictures, played for ever; the CRC is that of type and data.
+  std::string animated = png;
+  animated.insert(33, "\0\0\0\x08" "acTL" "\0\0\0\x02" "\0\0\0\0" "\xf3\x8d\x93\x70"s);
+  const DecodedImage image = read(animated);
+  ASSERT_EQ(image.notes.size(), 1u);
+  EXPECT_THAT(image.notes.front(), HasSubstr("only the first picture"));
+  EXPECT_EQ(image.samples, read(png).samples);
+}
+
 TEST(DecodePng, ThePixelSizeIsReportedInUm) {
   const DecodedImage image = read(png_file(2, 1, {0, 8, 0, {}, 4'000'000}, {1, 2}));
   ASSERT_TRUE(image.um_per_px_stated);
@@ -230,6 +243,51 @@ TEST(DecodeRefuses, EachByName) {
     EXPECT_EQ(result.error().code, refusal.code) << refusal.what << ": " << result.error().message;
     EXPECT_THAT(result.error().message, HasSubstr(refusal.message)) << refusal.what;
   }
+}
+
+/// `value` in place of what an entry of the first directory of a little-endian TIFF says.
+std::string with_tag(std::string file, std::uint16_t tag, std::uint32_t value) {
+  std::uint32_t at = 0;
+  std::memcpy(&at, file.data() + 4, 4);
+  std::uint16_t count = 0;
+  std::memcpy(&count, file.data() + at, 2);
+  for (std::size_t i = 0; i < count; ++i) {
+    char* const entry = file.data() + at + 2 + 12 * i;
+    std::uint16_t found = 0;
+    std::memcpy(&found, entry, 2);
+    const std::uint16_t type = TIFF_LONG;
+    if (found == tag) std::memcpy(entry + 2, &type, 2);
+    if (found == tag) std::memcpy(entry + 8, &value, 4);
+  }
+  return file;
+}
+
+TEST(DecodeRefuses, ATileThatIsLargerThanItsImageOrItsFileBeforeMemoryIsAskedFor) {
+  for (const std::uint16_t compression : {std::uint16_t{COMPRESSION_NONE}, std::uint16_t{COMPRESSION_ADOBE_DEFLATE}}) {
+    const std::string small = tiff_file({gradient(16, 16, 16, 65535)}, {.bits = 16, .compression = compression, .tile = 16});
+    const auto stated = [&](std::uint32_t side) { return decode_image(with_tag(with_tag(small, TIFFTAG_TILEWIDTH, side), TIFFTAG_TILELENGTH, side)); };
+    ASSERT_TRUE(stated(16));
+    const Result<DecodedImage> huge = stated(4096);  // half a gigabyte
+    ASSERT_FALSE(huge);
+    EXPECT_EQ(huge.error().code, ErrorCode::kLimit);
+    EXPECT_THAT(huge.error().message, HasSubstr("tiles of 4096 x 4096"));
+    const Result<DecodedImage> large = stated(1024);  // 32 MiB, from a few kilobytes: 9 MB at most if deflated
+    ASSERT_FALSE(large);
+    EXPECT_EQ(large.error().code, ErrorCode::kMalformed);
+    EXPECT_THAT(large.error().message, HasSubstr("more than the file can hold"));
+  }
+  // A tile of the usual size about a small image is fine, as is one of an image that is no multiple of 16.
+  for (const int tile : {256, 1024}) {
+    const Picture16 picture = gradient(20, 9, 1, 255);
+    EXPECT_EQ(read(tiff_file({picture}, {.compression = COMPRESSION_LZW, .tile = tile})).samples, picture.samples);
+  }
+}
+
+TEST(DecodeRefuses, ADamagedTiffInOurOwnWords) {
+  const std::string tiff = tiff_file({gradient(64, 64, 1, 255)}, {.compression = COMPRESSION_ADOBE_DEFLATE, .rows_per_strip = 16});
+  const Result<DecodedImage> broken = decode_image(with_bytes(tiff, 20, std::string(40, '\x55')));
+  ASSERT_FALSE(broken);
+  EXPECT_EQ(broken.error().message, "damaged or cut-off TIFF: strip 0 cannot be read");
 }
 
 TEST(DecodeRefuses, APngOrJpegThatStatesTooMuchBeforeItsPixelsAreLookedAt) {

@@ -19,8 +19,8 @@ void show(const CountedPicture& picture) {
   for (const auto& [name, line, finding] : {std::tuple("walls", &picture.lines.walls, &picture.findings.walls),
                                             std::tuple("outline", &picture.lines.outline, &picture.findings.outline)}) {
     if (!line->dimensions) continue;
-    std::printf("figure: figure 2, %s, %s of %d cells: D0 %s, r2 %.3f, boxes of %d to %d px, local slopes %.2f to %.2f, %s\n", picture.name.c_str(), name,
-                static_cast<int>(picture.cell_count), with_error(line->dimensions->capacity).c_str(), line->dimensions->capacity.r2,
+    std::printf("figure: figure 2, %s, %s of %d %s: D0 %s, r2 %.3f, boxes of %d to %d px, local slopes %.2f to %.2f, %s\n", picture.name.c_str(), name,
+                static_cast<int>(picture.cell_count), std::string(name_of(picture.objects)).c_str(), with_error(line->dimensions->capacity).c_str(), line->dimensions->capacity.r2,
                 static_cast<int>(line->dimensions->side_min_px), static_cast<int>(line->dimensions->side_max_px), finding->slopes.first,
                 finding->slopes.last, std::string(name_of(finding->finding)).c_str());
   }
@@ -66,8 +66,15 @@ TEST(Figure2, PhotographsGoTheSameWayBesideTheirOwnControls) {
     // None of them is a fractal that box counting could show: no power law over a decade that a control does not have too.
     const LineFinding& walls = counted->findings.walls;
     EXPECT_TRUE(walls.finding != Finding::kScaling || !walls.like_controls.empty()) << picture.file;
-    EXPECT_THAT(counted->verdict, Contains(HasSubstr("What follows for the cell walls")));
-    EXPECT_THAT(counted->verdict, Contains(HasSubstr("the cell walls could be counted at")));
+    const std::string name = line_names(counted->objects).walls;
+    EXPECT_THAT(counted->verdict, Contains(HasSubstr("What follows for the " + name)));
+    EXPECT_THAT(counted->verdict, Contains(HasSubstr("the " + name + " could be counted at")));
+    // The controls fill the field as the picture's objects do, and are counted with the same boxes.
+    for (const ControlReport& control : counted->controls) {
+      EXPECT_EQ(control.placement, counted->object_cover < 0.7 ? Placement::kSpread : Placement::kTouching) << picture.file;
+      ASSERT_TRUE(counted->lines.walls.dimensions && control.lines.walls.dimensions) << picture.file;
+      EXPECT_EQ(control.lines.walls.dimensions->side_max_px, counted->lines.walls.dimensions->side_max_px);
+    }
   }
   if (read == 0) GTEST_SKIP() << "COLONY_DATA has no pictures: not part of the project";
 }

@@ -69,6 +69,28 @@ TEST(GrowthPhases, AMissingPhaseIsMissing) {
   EXPECT_NEAR(rest.plateau->value, 100.95, 0.1);
 }
 
+TEST(GrowthPhases, ACellThatHasNotDividedDoesNotGrow) {
+  // One cell for 12 h, then two: as GET /series of a job at 13 h.
+  std::vector<GrowthPoint> one;
+  for (int i = 0; i < 200; ++i) one.push_back({13.0 * i / 199.0, i * 13 < 12 * 199 ? 1.0 : 2.0, 6.0 + 0.01 * i});
+  for (const std::size_t rows : {std::size_t{100}, one.size()}) {
+    const GrowthPhases phases = *growth_phases(std::span(one).first(rows));
+    EXPECT_FALSE(phases.exponential) << rows;
+    if (phases.lag) {
+      EXPECT_EQ(phases.lag->from_h, 0.0);
+      EXPECT_EQ(phases.lag->value, 1.0);
+    }
+    EXPECT_TRUE(phases.lag || phases.plateau) << rows;
+  }
+  // A slope that noise could have made is none; one beyond it is one, down as well as up.
+  std::vector<GrowthPoint> shrinking;
+  for (int i = 0; i < 30; ++i) shrinking.push_back({static_cast<double>(i), 1000.0 * std::pow(0.5, i / 10.0), 50.0});
+  const GrowthPhases down = *growth_phases(shrinking);
+  ASSERT_TRUE(down.exponential);
+  EXPECT_NEAR(down.exponential->value, -10.0, 1e-6);
+  EXPECT_FALSE(down.lag);
+}
+
 TEST(GrowthPhases, PerfectDataDivideByNothing) {
   const GrowthPhases phases = *growth_phases(three_phases(420.0, 0.0, 1));
   ASSERT_TRUE(phases.exponential && phases.linear_radius && phases.plateau);

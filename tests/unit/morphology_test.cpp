@@ -1,5 +1,7 @@
 #include "engine/analysis/morphology.hpp"
 
+#include <algorithm>
+#include <atomic>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -8,6 +10,7 @@
 #include "engine/analysis/neighbours.hpp"
 #include "engine/analysis/packing.hpp"
 #include "engine/analysis/radial.hpp"
+#include "engine/analysis/sides.hpp"
 #include "engine/base/maths.hpp"
 #include "engine/space/overlap.hpp"
 #include "tests/support/founding.hpp"
@@ -144,6 +147,89 @@ TEST(Neighbours, AHoneycombHasSixSidesInside) {
     EXPECT_LT(border.deviation_px, 0.5);
     EXPECT_NEAR(border.length_px, 24.0 / std::sqrt(3.0), 2.5);
   }
+}
+
+/// A honeycomb with a hole wherever three cells meet.
+TEST(Sides, HolesWhereCellsMeetAreGivenToTheirCells) {
+  const LabelImage whole = honeycomb(24.0, 9);
+  LabelImage holed = whole;
+  const auto near = [&](std::int64_t row, std::int64_t column) {
+    constexpr std::int64_t kReach = 6, kSquaredReach = 46;
+    std::vector<std::uint32_t> labels;
+    for (std::int64_t y = -kReach; y <= kReach; ++y) {
+      for (std::int64_t x = -kReach; x <= kReach; ++x) {
+        if (x * x + y * y <= kSquaredReach) labels.push_back(whole.at_or(row + y, column + x, 0));
+      }
+    }
+    std::sort(labels.begin(), labels.end());
+    labels.erase(std::unique(labels.begin(), labels.end()), labels.end());
+    return labels;
+  };
+  // All that has three cells within 6.8 px: sides are 13.9 px long, so the slanted ones are gone.
+  for (std::int64_t row = 0; row < whole.height_px; ++row) {
+    for (std::int64_t column = 0; column < whole.width_px; ++column) {
+      const auto labels = near(row, column);
+      if (labels.size() >= 3 && labels.front() != 0) holed.at(row, column) = 0;
+    }
+  }
+  const SideStatistics seen = side_statistics(*find_contacts(holed));
+  EXPECT_EQ(seen.other_count, 49u);  // two neighbours each
+  const ClosedSides closed = *closed_sides(holed, 24.0 * 24.0 * std::sqrt(3.0) / 2.0);
+  EXPECT_EQ(closed.sides.counts[2], 49u);
+  EXPECT_EQ(closed.sides.sides_mean, 6.0);
+  EXPECT_EQ(closed.hole_count, 128u);  // the corners of 81 cells that three share
+  EXPECT_EQ(closed.hole_max_px, 249u);
+  EXPECT_EQ(*closed_sides(whole, 498.8)->sides.p_value, *closed.sides.p_value);
+}
+
+TEST(Sides, AHoleIsSharedFairlyAndALargeOneStays) {
+  const LabelImage image = drawn({"........",
+                                  ".aaabbb.",
+                                  ".a....b.",
+                                  ".a....b.",
+                                  ".aaabbb.",
+                                  "........",
+                                  "...c.c..",
+                                  "........"});
+  const GivenHoles given = *give_holes(image, 8);
+  EXPECT_EQ(given.hole_count, 1u);
+  EXPECT_EQ(given.hole_px, 8u);
+  for (std::int64_t row = 2; row < 4; ++row) {
+    for (std::int64_t column = 2; column < 6; ++column) {
+      EXPECT_EQ(given.labels.at(row, column), static_cast<std::uint32_t>(column < 4 ? 'a' : 'b')) << row << ' ' << column;
+    }
+  }
+  EXPECT_EQ(given.labels.at(6, 4), 0u);  // outside
+  EXPECT_EQ(give_holes(image, 7)->labels.values, image.values);
+  EXPECT_EQ(give_holes(image, 7)->hole_count, 0u);
+  // A gap that is closed lies at the frame's edge here: there is no row before it.
+  EXPECT_EQ(give_holes(drawn({"...", "a.b", "..."}), 8, 1)->labels.values, drawn({"...", "aab", "..."}).values);
+  EXPECT_EQ(give_holes(drawn({"a.b", "a.b", "a.b"}), 8, 1)->labels.values, drawn({"aab", "aab", "aab"}).values);
+  const std::atomic<bool> stop{true};
+  EXPECT_THROW((void)give_holes(image, 8, 0, &stop), Stopped);
+  EXPECT_THROW((void)find_contacts(image, 0, &stop), Stopped);
+}
+
+TEST(Sides, TheVerdictSaysWhichCountToCompare) {
+  SideStatistics seen;
+  seen.counts = {30, 40, 20, 5, 0, 0};
+  seen.sides_mean = 4.83;
+  seen.p_value = 1.4e-38;
+  ClosedSides closed;
+  closed.hole_count = 198;
+  closed.sides = seen;
+  closed.sides.sides_mean = 5.91;
+  closed.sides.p_value = 0.74;
+  const std::vector<std::string> words = judge_sides(seen, closed);
+  ASSERT_EQ(words.size(), 3u);
+  EXPECT_NE(words[0].find("4.830 sides on average"), std::string::npos);
+  EXPECT_NE(words[0].find("p is below 0.001: they differ"), std::string::npos);
+  EXPECT_NE(words[1].find("198 holes"), std::string::npos);
+  EXPECT_NE(words[1].find("p = 0.740: no difference"), std::string::npos);
+  EXPECT_NE(words[2].find("not the cells"), std::string::npos);
+  closed.sides.p_value = 0.001;
+  EXPECT_EQ(judge_sides(seen, closed).size(), 2u);
+  EXPECT_TRUE(judge_sides({}, {}).empty());  // nothing inside
 }
 
 /// Gibson's chain: a dividing cell of i sides leaves j - 4 of its i - 4 free sides to a daughter by a fair coin, and gains one, on average,

@@ -106,7 +106,7 @@ TEST(Results, SeriesImageAndLog) {
   EXPECT_EQ(json_of(series)["items"].size(), 3u);
   auto csv = fixture.get(kJob + "/series", {{"Accept", "text/csv"}});
   EXPECT_EQ(split_lines(body_of(csv), "\r\n").size(), 201u);
-  auto image = fixture.get(kJob + "/image?width_px=64&style=contours&colour_by=age&scale_bar=false");
+  auto image = fixture.get(kJob + "/image?width_px=64&style=shaded&colour_by=age&scale_bar=false");
   EXPECT_EQ(image.status, 200);
   EXPECT_EQ(header(image, "Content-Type"), "image/png");
   EXPECT_THAT(image.body, StartsWith("\x89PNG\r\n\x1a\n"));

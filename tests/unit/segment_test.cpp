@@ -137,8 +137,14 @@ TEST(Segment, EveryStepIsKeptByNameOrOnlyTheOneAskedFor) {
   EXPECT_EQ(names(found_in(image)), (std::vector<std::string>{"grey", "background", "corrected", "signal", "threshold",
                                                               "cleaned", "distance", "overlay"}));
   SegmentOptions options;
-  options.keep_only = "overlay";
-  EXPECT_EQ(names(found_in(image, options)), std::vector<std::string>{"overlay"});
+  for (const StepImage& step : found_in(image).steps) {
+    options.keep_only = step.name;
+    const Segmentation one = found_in(image, options);
+    ASSERT_EQ(names(one), std::vector<std::string>{step.name});
+    EXPECT_EQ(one.steps.front().values, step.values) << step.name;
+    EXPECT_TRUE(one.sweep.empty()) << step.name;
+    EXPECT_EQ(one.labels.values.empty(), step.name != "overlay") << step.name;  // what comes after it is not made
+  }
   options.keep_only = "";
   options.keep_steps = false;
   EXPECT_TRUE(found_in(image, options).steps.empty());

@@ -131,12 +131,19 @@ TEST(Labels, ColoursAreIdsAndBack) {
   std::set<std::uint32_t> colours;
   for (std::uint32_t id = 0; id < 100'000; ++id) {
     const std::uint32_t colour = label_colour(CellId{id});
-    ASSERT_LT(colour, kLabelColours);
+    ASSERT_LT(colour, 1U << 24);
+    ASSERT_TRUE(id == 0 || (colour & 0x808080U) != 0) << "nearly black: " << id;
     ASSERT_EQ(label_of_colour(colour).value, id);
     colours.insert(colour);
   }
   EXPECT_EQ(colours.size(), 100'000u);
   EXPECT_EQ(label_colour(CellId{0}), 0u);
+  for (const std::uint32_t id : {kLabelColours - 1, kLabelColours / 2}) EXPECT_EQ(label_of_colour(label_colour(CellId{id})).value, id);
+  for (const std::uint32_t dark : {0x7F7F7FU, 0x010000U, 0x00007FU}) EXPECT_EQ(label_of_colour(dark).value, 0u);
+  // As the comment in render.hpp says it, for who reads a picture without this program: id 1 is number 9,072,779.
+  const std::uint32_t number = 9'072'779, high = (number >> 21) + 1;
+  EXPECT_EQ(label_colour(CellId{1}), ((high >> 2 & 1U) << 7 | (number >> 14 & 127U)) << 16 | ((high >> 1 & 1U) << 7 | (number >> 7 & 127U)) << 8 |
+                                         (high & 1U) << 7 | (number & 127U));
   const Params params = paper();
   const Colony colony = found(params, scattered_cells(20, 40.0, 3));
   PictureSpec spec = plain(PictureStyle::kLabels, 0.2);

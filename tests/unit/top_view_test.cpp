@@ -1,12 +1,14 @@
 #include "engine/picture/top_view.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <gtest/gtest.h>
 
 #include "engine/picture/column.hpp"
 #include "tests/support/founding.hpp"
+#include "tests/support/targets.hpp"
 
 namespace colony {
 namespace {
@@ -187,6 +189,39 @@ TEST(TopView, NothingOfTheBodyStandsAboveItsTop) {
         }
       }
     }
+  }
+}
+
+TEST(TopView, ColumnsSideBySideAreTheScalarScanToTheLastBit) {
+  for (const NoiseParams noise : {NoiseParams{0.40, 5.0, 1.4}, NoiseParams{0.45, 5.0, 6.2}, NoiseParams{0.0, 5.0, 1.4}}) {
+    Params params = paper();
+    params.noise = noise;
+    const Colony colony = found(params, scattered_cells(6, 10.0, 13));
+    testing::on_every_target([&](const std::string&) {
+      int raised = 0;
+      for (const Cell& cell : colony.cells()) {
+        const Body& body = colony.body(cell.id);
+        const ColumnScan scan(body);
+        const kernel::TopBody prepared = scan.prepared();
+        Stream stream(4, cell.id, 0, Purpose::kSettlePoints);
+        for (int round = 0; round < 20; ++round) {
+          std::array<double, kernel::kTopRun> x{}, floor{}, top{};
+          const double y = stream.uniform({body.box().low.y(), body.box().high.y()});
+          for (std::size_t i = 0; i < x.size(); ++i) {
+            x[i] = stream.uniform({body.box().low.x() - 1.0, body.box().high.x() + 1.0});
+            // What another cell left there: nothing, something, or more than this cell can reach.
+            floor[i] = i % 3 == 0 ? 0.0 : stream.uniform({0.0, 1.2 * body.box().high.z()});
+          }
+          const std::size_t count = 1 + static_cast<std::size_t>(stream.uniform({0.0, 63.0}));
+          kernel::column_tops(prepared, x.data(), y, floor.data(), count, top.data());
+          for (std::size_t i = 0; i < count; ++i) {
+            ASSERT_EQ(top[i], scan.top_um(x[i], y, floor[i])) << i << " of " << count;
+            raised += top[i] > floor[i] ? 1 : 0;
+          }
+        }
+      }
+      EXPECT_GT(raised, 500);
+    }, false);
   }
 }
 

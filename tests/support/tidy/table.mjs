@@ -42,7 +42,7 @@ export const thirdParty = [
   { prefix: 'xxhash.h', places: ['engine/base/'] },
   { prefix: 'Random123/', places: ['engine/random/'] },
   { prefix: 'xmmintrin.h', places: ['engine/base/'] },  // the floating-point mode
-  { prefix: 'hwy/', places: ['engine/space/', 'engine/random/philox_simd.cpp', 'engine/random/sobol_simd.cpp', 'engine/picture/path_simd.cpp'] },
+  { prefix: 'hwy/', places: ['engine/space/', 'engine/random/philox_simd.cpp', 'engine/random/sobol_simd.cpp', 'engine/picture/path_simd.cpp', 'engine/picture/top_simd.cpp'] },
   { prefix: 'tbb/', places: ['engine/sim/', 'engine/growth/scorer.*'] },
   { prefix: 'oneapi/', places: [] },  // the same library's other name: say tbb/
   { prefix: 'Eigen/', places: ['engine/'] },

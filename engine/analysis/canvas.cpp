@@ -1,0 +1,104 @@
+#include "engine/analysis/canvas.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "engine/analysis/opencv.hpp"
+#include "engine/base/check.hpp"
+
+namespace colony {
+namespace {
+
+constexpr int kTwice = 2;
+constexpr int kShift = 4;  // OpenCV's sub-pixels: sixteenths
+constexpr std::int64_t kCanvasSideMax_px = 4096;
+
+cv::Mat matrix(std::vector<std::uint8_t>& pixels, std::int64_t width_px, std::int64_t height_px) {
+  return {static_cast<int>(kTwice * height_px), static_cast<int>(kTwice * width_px), CV_8UC3, pixels.data()};
+}
+
+// Far outside is as good as outside: the clamp keeps conversions defined.
+int fixed(double at) {
+  const double far = 4.0 * kCanvasSideMax_px;
+  return static_cast<int>(std::clamp(at, -far, far) * kTwice * (1 << kShift) + (at < 0.0 ? -0.5 : 0.5));
+}
+int whole(double at) { return static_cast<int>(std::clamp(at, 0.0, 1000.0) * kTwice + 0.5); }
+cv::Point point(CanvasPoint at) { return {fixed(at.x), fixed(at.y)}; }
+cv::Scalar colour(Ink ink) { return {static_cast<double>(ink.red), static_cast<double>(ink.green), static_cast<double>(ink.blue)}; }
+
+constexpr int kFont = cv::FONT_HERSHEY_SIMPLEX;
+constexpr double kCapitalHeight = 21.0;  // of this font at scale 1
+
+}  // namespace
+
+Canvas::Canvas(std::int64_t width_px, std::int64_t height_px) : width_px_(width_px), height_px_(height_px) {
+  CHECK(width_px >= 1 && height_px >= 1 && width_px <= kCanvasSideMax_px && height_px <= kCanvasSideMax_px);
+  twice_.assign(static_cast<std::size_t>(3 * kTwice * kTwice * width_px * height_px), 0xff);
+  settle_opencv();
+}
+
+void Canvas::line(CanvasPoint from, CanvasPoint to, Ink ink, double width_px) {
+  cv::Mat all = matrix(twice_, width_px_, height_px_);
+  cv::line(all, point(from), point(to), colour(ink), std::max(1, whole(width_px)), cv::LINE_AA, kShift);
+}
+
+void Canvas::lines(const std::vector<CanvasPoint>& points, Ink ink, double width_px) {
+  for (std::size_t i = 1; i < points.size(); ++i) line(points[i - 1], points[i], ink, width_px);
+}
+
+void Canvas::box(CanvasPoint corner, double width_px, double height_px, Ink ink, bool is_filled) {
+  cv::Mat all = matrix(twice_, width_px_, height_px_);
+  cv::rectangle(all, point(corner), point({corner.x + width_px, corner.y + height_px}), colour(ink), is_filled ? cv::FILLED : kTwice, cv::LINE_8,
+                kShift);
+}
+
+void Canvas::dot(CanvasPoint centre, double radius_px, Ink ink, bool is_filled) {
+  cv::Mat all = matrix(twice_, width_px_, height_px_);
+  // A hollow one hides what runs behind it.
+  if (!is_filled) cv::circle(all, point(centre), fixed(radius_px), cv::Scalar(255, 255, 255), cv::FILLED, cv::LINE_AA, kShift);
+  cv::circle(all, point(centre), fixed(radius_px), colour(ink), is_filled ? cv::FILLED : kTwice, cv::LINE_AA, kShift);
+}
+
+void Canvas::text(CanvasPoint at, std::string_view ascii, Ink ink, Align align, double height_px) {
+  CHECK(std::all_of(ascii.begin(), ascii.end(), [](char c) { return c >= ' ' && c <= '~'; }));
+  cv::Mat all = matrix(twice_, width_px_, height_px_);
+  const double scale = height_px * kTwice / kCapitalHeight;
+  const int stroke = std::max(1, static_cast<int>(height_px / 7.0 + 0.5));
+  const std::string copy(ascii);
+  int below = 0;
+  const int width = cv::getTextSize(copy, kFont, scale, stroke, &below).width;
+  const int back = align == Align::kLeft ? 0 : align == Align::kCentre ? width / 2 : width;
+  cv::putText(all, copy, {(fixed(at.x) >> kShift) - back, fixed(at.y) >> kShift}, kFont, scale, colour(ink), stroke, cv::LINE_AA);
+}
+
+void Canvas::shade(std::int64_t row, std::int64_t column, Ink ink, double share) {
+  if (row < 0 || column < 0 || row >= height_px_ || column >= width_px_) return;
+  const double part = std::clamp(share, 0.0, 1.0);
+  const std::uint8_t values[3] = {ink.red, ink.green, ink.blue};
+  for (std::int64_t y = kTwice * row; y < kTwice * (row + 1); ++y) {
+    for (std::int64_t x = kTwice * column; x < kTwice * (column + 1); ++x) {
+      std::uint8_t* pixel = twice_.data() + 3 * (y * kTwice * width_px_ + x);
+      for (int c = 0; c < 3; ++c) pixel[c] = static_cast<std::uint8_t>(pixel[c] + part * (values[c] - pixel[c]) + 0.5);
+    }
+  }
+}
+
+StepImage Canvas::picture() const {
+  StepImage image;
+  image.width_px = width_px_;
+  image.height_px = height_px_;
+  image.channel_count = 3;
+  image.values.resize(static_cast<std::size_t>(3 * width_px_ * height_px_));
+  const std::int64_t stride = 3 * kTwice * width_px_;
+  for (std::int64_t row = 0; row < height_px_; ++row) {
+    for (std::int64_t at = 0; at < 3 * width_px_; ++at) {
+      const std::uint8_t* pixel = twice_.data() + kTwice * row * stride + kTwice * 3 * (at / 3) + at % 3;
+      image.values[static_cast<std::size_t>(3 * width_px_ * row + at)] =
+          static_cast<std::uint8_t>((pixel[0] + pixel[3] + pixel[stride] + pixel[stride + 3] + 2) / 4);
+    }
+  }
+  return image;
+}
+
+}  // namespace colony
