@@ -188,7 +188,7 @@ const std::vector<ConfigKey>& config_keys() {
       integer_key<Big>("jobs.keep_days", 0, 36'500, "days an ended job is kept; default 0: for ever (label keep=true: always)",
                        [](Config& c) -> Big& { return c.jobs.retention.keep_days; }),
       integer_key<Big>("jobs.keep_bytes", 0, 1'000'000'000'000'000,
-                       "stored bytes of all ended jobs, beyond which the oldest go; default 0: no bound",
+                       "stored bytes of ended jobs (those with keep=true not counted), beyond which the oldest go; default 0: no bound",
                        [](Config& c) -> Big& { return c.jobs.retention.keep_bytes; }),
       integer_key<Big>("limits.cells_max", 1, 4'294'967'295, "cells of a job; default 1000000",
                        [](Config& c) -> Big& { return c.jobs.cells_max; }),

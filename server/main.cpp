@@ -4,13 +4,17 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
+#include <future>
 #include <memory>
 #include <string>
 #include <thread>
 
+#include <spdlog/async.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
@@ -28,6 +32,8 @@ extern char** environ;
 namespace colony::server {
 namespace {
 
+constexpr std::size_t kLogLinesMax = 8192;
+constexpr std::chrono::seconds kLogEnd{2};
 constexpr std::int64_t kGrace_ms = 5'000;  // for answers under way; with the runners' end well within the 10 s promised
 
 Environment environment() {
@@ -120,9 +126,8 @@ void warn_of_settings(const Log& log, const Config& config, const http::TokenTab
   }
 }
 
-int serve(const Config& config) {
+int serve(const Config& config, const sigset_t& signals) {
   const Log log(config.log_format);
-  const sigset_t signals = block_signals();
   allow_descriptors();
   auto store = Store::open(config.store);
   if (!store) return log.fail("cannot open the data folder " + config.store.data_dir, store.error());
@@ -176,9 +181,31 @@ int serve(const Config& config) {
   return 0;
 }
 
-int run(int argc, char** argv) {
-  spdlog::set_default_logger(spdlog::stderr_logger_mt("colonyd"));
+void set_logger(std::shared_ptr<spdlog::logger> logger) {
+  spdlog::set_default_logger(std::move(logger));
   spdlog::set_pattern("%Y-%m-%dT%H:%M:%S.%eZ %l %v", spdlog::pattern_time_type::utc);
+}
+
+// Lines are written by a thread of their own: whoever does not read standard error must not hold an I/O thread. When too many wait, the
+// oldest are lost.
+void write_log_aside() {
+  spdlog::init_thread_pool(kLogLinesMax, 1);
+  set_logger(spdlog::create_async_nb<spdlog::sinks::stderr_sink_mt>("colonyd serving"));
+}
+
+// Returns when all lines are out. If nobody takes them for kLogEnd, the process ends without them.
+void end_log(int status) {
+  const auto ended = std::make_shared<std::promise<void>>();
+  auto is_out = ended->get_future();
+  std::thread([ended] {
+    spdlog::shutdown();
+    ended->set_value();
+  }).detach();
+  if (is_out.wait_for(kLogEnd) != std::future_status::ready) std::_Exit(status);
+}
+
+int run(int argc, char** argv) {
+  set_logger(spdlog::stderr_logger_mt("colonyd"));
   const auto invocation = configure(std::vector<std::string>(argv + 1, argv + argc), environment(), COLONY_VERSION,
                                     usable_cores());
   if (!invocation) {
@@ -190,7 +217,11 @@ int run(int argc, char** argv) {
     return 0;
   }
   if (invocation->token) return run_token_create(invocation->config, *invocation->token);
-  return serve(invocation->config);
+  const sigset_t signals = block_signals();  // before any thread
+  write_log_aside();
+  const int status = serve(invocation->config, signals);
+  end_log(status);
+  return status;
 }
 
 }  // namespace

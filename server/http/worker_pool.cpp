@@ -8,7 +8,8 @@ namespace colony::server::http {
 WorkerPool::WorkerPool(std::size_t thread_count, std::size_t requests_waiting_max)
     : thread_count_(thread_count),
       heavy_max_(std::max<std::size_t>(1, thread_count / 2)),
-      requests_waiting_max_(requests_waiting_max) {}
+      requests_waiting_max_(requests_waiting_max),
+      heavy_waiting_max_(std::max<std::size_t>(1, requests_waiting_max / 8)) {}
 
 WorkerPool::~WorkerPool() { stop(); }
 
@@ -19,7 +20,7 @@ void WorkerPool::start() {
 bool WorkerPool::submit_request(Task task, bool is_heavy) {
   {
     const std::lock_guard lock(mutex_);
-    if (stopping_ || requests_.size() + heavy_.size() >= requests_waiting_max_) return false;
+    if (stopping_ || (is_heavy ? heavy_.size() >= heavy_waiting_max_ : requests_.size() >= requests_waiting_max_)) return false;
     (is_heavy ? heavy_ : requests_).push_back(std::move(task));
   }
   changed_.notify_one();

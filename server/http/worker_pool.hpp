@@ -37,10 +37,11 @@ class WorkerPool {
   const std::size_t thread_count_;
   const std::size_t heavy_max_;
   const std::size_t requests_waiting_max_;
+  const std::size_t heavy_waiting_max_;  // minutes of work must not fill the queue of those who only look
   std::vector<std::thread> threads_;  // touched by start and stop only
   std::mutex mutex_;                  // guards everything below
   std::condition_variable changed_;
-  std::deque<Task> requests_;  // with heavy_, at most requests_waiting_max_
+  std::deque<Task> requests_;
   std::deque<Task> heavy_;
   std::size_t heavy_running_ = 0;
   std::deque<Task> pulls_;

@@ -51,9 +51,9 @@ std::vector<std::int64_t> too_much(Connection& connection, std::uint64_t keep_by
   // What is still being removed fills pages that no job owns.
   if (integer(connection, "SELECT EXISTS (SELECT 1 FROM job WHERE deleted <> 0)") != 0) return {};
   const auto events = static_cast<double>(integer(connection, "SELECT coalesce(sum(last_seq), 0) FROM job"));
-  const auto ended = static_cast<double>(integer(
-      connection,
-      "SELECT coalesce(sum(last_seq), 0) FROM job WHERE deleted = 0 AND state IN ('succeeded', 'failed', 'cancelled')"));
+  // Only of those that may go: what is protected must not push the others out.
+  const auto ended =
+      static_cast<double>(integer(connection, "SELECT coalesce(sum(last_seq), 0) FROM job WHERE" COLONY_MAY_GO));
   if (events <= 0.0) return {};
   const double bytes_per_event = history_bytes(connection) / events;
   double excess = ended * bytes_per_event - static_cast<double>(keep_bytes);

@@ -1,6 +1,7 @@
 // security: who is let in, over what, and what is written down about it.
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
+import { once } from 'node:events';
 import net from 'node:net';
 import test from 'node:test';
 import tls from 'node:tls';
@@ -200,4 +201,14 @@ test('without tokens every local user is "local"', async (t) => {
   assert.equal(job.submitted_by, 'local');
   const log = (await server.get(`/v1/jobs/${job.id}/log`)).text.trim().split('\n').map((line) => JSON.parse(line));
   assert.equal(log[0].actor, 'local');
+});
+
+test('a log that nobody reads holds nobody up', async (t) => {
+  const server = await startServer(t);
+  server.child.stderr.pause();  // the pipe fills, as behind a pager or a dead collector
+  for (let i = 0; i < 2000; ++i) assert.equal((await server.get('/healthz', { 'X-Request-Id': `${'x'.repeat(58)}-${i}` })).status, 200);
+  const ended = once(server.child, 'exit');
+  server.child.kill('SIGTERM');
+  assert.deepEqual(await within(10_000, ended, 'colonyd to end though its log is stuck'), [0, null]);
+  server.child.stderr.resume();
 });

@@ -191,6 +191,44 @@ TEST(HttpSession, EveryRequestIsLogged) {
   EXPECT_EQ(records[1].request_id, "id-8");
 }
 
+// Minutes of drawing must not keep those out who only look.
+TEST(HttpLimits, HeavyRequestsHaveAQueueOfTheirOwn) {
+  ServerConfig config;
+  config.worker_threads = 2;
+  config.requests_waiting_max = 8;  // one heavy request may wait
+  Door door;
+  TestServer server(
+      [&door](Router& router) {
+        router.add(
+            "GET", "/door",
+            [&door](const Request&) {
+              door.pass();
+              return text("passed");
+            },
+            Router::Weight::kHeavy);
+        router.add("GET", "/light", [](const Request&) { return text("light"); });
+      },
+      config);
+  server.run();
+  RawClient running(server.port());
+  running.send(get("/door"));
+  door.wait_for_arrivals(1);
+  RawClient a(server.port());
+  RawClient b(server.port());
+  a.send(get("/door"));
+  b.send(get("/door"));
+  while (!a.is_readable(5) && !b.is_readable(5)) {
+  }
+  const bool a_is_refused = a.is_readable(0);
+  EXPECT_EQ((a_is_refused ? a : b).read_reply().status, 503);
+  RawClient light(server.port());
+  light.send(get("/light"));
+  EXPECT_EQ(light.read_reply().body, "light");
+  door.open();
+  EXPECT_EQ(running.read_reply().body, "passed");
+  EXPECT_EQ((a_is_refused ? b : a).read_reply().body, "passed");
+}
+
 TEST(HttpLimits, AFullQueueIsToldAtOnce) {
   ServerConfig config;
   config.worker_threads = 1;

@@ -68,6 +68,17 @@ TEST_F(Retention, NoMoreGoesThanIsTooMuch) {
   EXPECT_EQ(gone, std::vector<std::size_t>{0});
 }
 
+TEST_F(Retention, WhatIsKeptTakesNoRoomFromTheOthers) {
+  std::vector<std::size_t> gone;
+  std::uint64_t bytes = std::uint64_t{1} << 22;
+  for (; gone.empty() && bytes > 0; bytes -= 4096) gone = round({0, bytes}, now_ms());
+  ASSERT_EQ(gone, std::vector<std::size_t>{0});  // two that may go, beside one that is kept
+  JobTextChange change;
+  change.labels["keep"] = "true";
+  ASSERT_TRUE(service_->edit(ids_[2], change, std::nullopt, "tester"));
+  EXPECT_EQ(round({0, bytes / 2 + 8192}, now_ms()), std::vector<std::size_t>{}) << "one is left that may go, and it fits";
+}
+
 TEST_F(Retention, NothingGoesWhileItFits) {
   EXPECT_EQ(round({0, std::uint64_t{1} << 30}, now_ms()), std::vector<std::size_t>{});
   EXPECT_EQ(round({36'500, std::uint64_t{1} << 30}, now_ms()), std::vector<std::size_t>{});
