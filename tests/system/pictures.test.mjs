@@ -113,7 +113,8 @@ test('a job is seen, measured and compared', async (t) => {
   await t.test('by the command line', async () => {
     const folder = temporaryFolder(t);
     const page = join(folder, 'report.html');
-    assert.equal((await colony(server, ['report', job.id, '-o', page])).code, 0);
+    const reported = await colony(server, ['report', job.id, '-o', page]);
+    assert.equal(reported.code, 0, reported.err);
     const html = readFileSync(page, 'utf8');
     assert.ok(html.includes(job.digest));
     assert.doesNotMatch(html, /(src|href)\s*=\s*"(?!data:)/i, 'nothing is loaded from anywhere');
