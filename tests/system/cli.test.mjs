@@ -5,7 +5,7 @@ import { existsSync, mkdirSync, readFileSync, readdirSync, writeFileSync } from 
 import { join } from 'node:path';
 import test from 'node:test';
 import { allEvents, command, endless, finishedJob, grown, reached, show, small, submit } from './harness/jobs.mjs';
-import { cleanEnvironment, cliBinary, startServer, temporaryFolder } from './harness/server.mjs';
+import { assertSane, cleanEnvironment, cliBinary, startServer, temporaryFolder } from './harness/server.mjs';
 import { eventually, within } from './harness/wait.mjs';
 
 const exit = { done: 0, failed: 1, usage: 2, unreachable: 3, refused: 4, cancelled: 5, interrupted: 130 };
@@ -32,6 +32,7 @@ function start(args, { server, cwd, input, env = {} } = {}) {
 async function colony(args, options) {
   const run = start(args, options);
   run.code = await run.ended;
+  assertSane(run.err);  // a sanitizer's exit status is that of a failed job
   return run;
 }
 

@@ -5,7 +5,7 @@ import { statSync } from 'node:fs';
 import { join } from 'node:path';
 import test from 'node:test';
 import { command, finishedJob, reached, show, submit, terminal } from './harness/jobs.mjs';
-import { Server, full, startServer, temporaryFolder } from './harness/server.mjs';
+import { Server, assertSane, full, startServer, temporaryFolder } from './harness/server.mjs';
 import { Stream } from './harness/stream.mjs';
 import { seeded, within } from './harness/wait.mjs';
 
@@ -108,6 +108,7 @@ test('DATA belongs to one server', async (t) => {
   second.expectedToDie = true;
   const end = await within(60_000, second.exited, 'the second server to give up');
   assert.ok(end.code !== 0 && end.signal === null, `it refuses: ${JSON.stringify(end)}`);
+  assertSane(second.err);
   assert.match(second.err, /lock|in use|another/i);
   assert.equal((await first.get('/readyz')).status, 200, 'the first goes on');
   await first.kill();
@@ -132,5 +133,6 @@ test('a server that cannot serve says why and ends', async (t) => {
     const end = await within(60_000, server.exited, 'the server to give up');
     assert.ok(end.code !== 0 && end.signal === null, `${args}: ${JSON.stringify(end)}`);
     assert.match(server.err, text);
+    assertSane(server.err);
   }
 });

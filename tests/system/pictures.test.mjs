@@ -7,7 +7,7 @@ import test from 'node:test';
 import validator from 'gltf-validator';
 import { finishedJob, small } from './harness/jobs.mjs';
 import { discs, greyPng, pngFacts } from './harness/png.mjs';
-import { cleanEnvironment, cliBinary, startServer, temporaryFolder } from './harness/server.mjs';
+import { assertSane, cleanEnvironment, cliBinary, startServer, temporaryFolder } from './harness/server.mjs';
 import { eventually, within } from './harness/wait.mjs';
 
 const sendPicture = (server, body, query = '', type = 'image/png') =>
@@ -18,7 +18,8 @@ function colony(server, args) {
   let out = '', err = '';
   child.stdout.on('data', (bytes) => { out += bytes; });
   child.stderr.on('data', (bytes) => { err += bytes; });
-  return within(120_000, new Promise((done) => child.on('close', (code) => done({ code, out, err }))), `colony ${args[0]}`);
+  return within(120_000, new Promise((done) => child.on('close', (code) => done({ code, out, err }))), `colony ${args[0]}`)
+    .then((run) => { assertSane(run.err); return run; });
 }
 
 /** A little-endian TIFF of one strip that says it is width x height. */
@@ -114,7 +115,8 @@ test('a job is seen, measured and compared', async (t) => {
   await t.test('by the command line', async () => {
     const folder = temporaryFolder(t);
     const page = join(folder, 'report.html');
-    assert.equal((await colony(server, ['report', job.id, '-o', page])).code, 0);
+    const reported = await colony(server, ['report', job.id, '-o', page]);
+    assert.equal(reported.code, 0, reported.err);
     const html = readFileSync(page, 'utf8');
     assert.ok(html.includes(job.digest));
     assert.doesNotMatch(html, /(src|href)\s*=\s*"(?!data:)/i, 'nothing is loaded from anywhere');

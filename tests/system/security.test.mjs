@@ -6,7 +6,7 @@ import net from 'node:net';
 import test from 'node:test';
 import tls from 'node:tls';
 import { finishedJob, small } from './harness/jobs.mjs';
-import { cleanEnvironment, cliBinary, createToken, refusedStart, startServer, temporaryFolder } from './harness/server.mjs';
+import { assertSane, cleanEnvironment, cliBinary, createToken, refusedStart, startServer, temporaryFolder } from './harness/server.mjs';
 import { openStream } from './harness/stream.mjs';
 import { makeCertificate, sendTls } from './harness/tls.mjs';
 import { within } from './harness/wait.mjs';
@@ -190,7 +190,10 @@ test('TLS', async (t) => {
     const clear = run(['list', '--server', 'http://lab.example'], { COLONY_TOKEN: token });
     assert.equal(clear.status, 2);
     assert.match(clear.stderr, /in the clear/);
-    for (const { stdout, stderr } of [right, distrusted, nobody, clear]) assert.ok(!`${stdout}${stderr}`.includes(token.slice(0, 20)));
+    for (const { stdout, stderr } of [right, distrusted, nobody, clear]) {
+      assert.ok(!`${stdout}${stderr}`.includes(token.slice(0, 20)));
+      assertSane(stderr);
+    }
   });
   assertNoSecrets(server, token);
 });

@@ -36,6 +36,11 @@ export function cleanEnvironment() {
     .filter(([name]) => !name.startsWith('COLONY_') && !/proxy$/i.test(name) && !name.startsWith('NODE_')));
 }
 
+/** What no program of ours may say, however it ended: a kill or a refusal must not hide a sanitizer's report that came first. */
+export function assertSane(stderr) {
+  assert.doesNotMatch(stderr, /Sanitizer|runtime error:|terminate called|check failed/);
+}
+
 export class Server {
   constructor(data, args, token) {
     assert.ok(existsSync(serverBinary), `${serverBinary} is not built`);
@@ -108,16 +113,18 @@ export class Server {
       this.child.kill('SIGKILL');
       throw error;
     });
+    assertSane(this.err);
     if (this.expectedToDie) return;
     assert.deepEqual(end, { code: 0, signal: null }, `colonyd did not end cleanly:\n${this.err.slice(-4000)}`);
-    assert.doesNotMatch(this.err, /Sanitizer|runtime error:|terminate called|check failed/);
   }
 
   /** As a power failure would. */
   async kill() {
     this.expectedToDie = true;
     this.child.kill('SIGKILL');
-    assert.deepEqual(await within(drainMax_ms, this.exited, 'a killed process to end'), { code: null, signal: 'SIGKILL' });
+    const end = await within(drainMax_ms, this.exited, 'a killed process to end');
+    assertSane(this.err);
+    assert.deepEqual(end, { code: null, signal: 'SIGKILL' });
   }
 }
 
@@ -131,6 +138,7 @@ export function createToken(data, name, scope, expires_h = 1) {
 export function refusedStart(data, args) {
   const { status, stderr } = spawnSync(serverBinary, ['--data', data, ...args],
     { env: { ...cleanEnvironment(), HOME: data }, encoding: 'utf8', timeout: startMax_ms });
+  assertSane(stderr);
   return { status, stderr };
 }
 
