@@ -2,6 +2,8 @@
 // Every wait of the client ends after kPatienceMs: a test then fails instead of hanging.
 #pragma once
 
+#include <mutex>
+#include <condition_variable>
 #include <algorithm>
 #include <arpa/inet.h>
 #include <cstdint>
@@ -22,6 +24,32 @@
 #include "server/http/server.hpp"
 
 namespace colony::server::http {
+
+/// A door that handlers wait at until the test opens it.
+class Door {
+ public:
+  void pass() {
+    std::unique_lock lock(mutex_);
+    ++arrived_;
+    changed_.notify_all();
+    changed_.wait(lock, [this] { return open_; });
+  }
+  void wait_for_arrivals(int count) {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [this, count] { return arrived_ >= count; });
+  }
+  void open() {
+    const std::lock_guard lock(mutex_);
+    open_ = true;
+    changed_.notify_all();
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  int arrived_ = 0;
+  bool open_ = false;
+};
 
 inline constexpr int kPatienceMs = 20'000;
 
