@@ -9,6 +9,7 @@
 #include <boost/beast/http/error.hpp>
 #include <boost/beast/http/parser.hpp>
 #include <boost/beast/http/string_body.hpp>
+#include <boost/none.hpp>
 
 #include "engine/base/check.hpp"
 
@@ -39,6 +40,7 @@ struct BodyReader::Chunks {
   beast::http::request_parser<beast::http::string_body> parser;
   std::function<void(std::uint64_t, beast::string_view, beast::error_code&)> on_header;
   std::size_t extension_bytes = 0;
+  std::uint64_t announced_bytes = 0;  // of all chunks whose line was read whole
   bool has_data = false;  // a chunk that is not the last has begun
 };
 
@@ -49,11 +51,18 @@ BodyReader::BodyReader(const RequestHead& head, std::size_t body_bytes_max) : bo
     return;
   }
   chunks_ = std::make_unique<Chunks>();
-  chunks_->parser.body_limit(body_bytes_max);
+  // The bound is ours: Beast takes a chunk's size off its own each time it reads the line, and a line whose extension opens a quote it
+  // reads again with every piece.
+  chunks_->parser.body_limit(boost::none);
   chunks_->parser.eager(true);
-  chunks_->on_header = [chunks = chunks_.get()](std::uint64_t, beast::string_view extensions,
-                                                beast::error_code& error) {
+  chunks_->on_header = [chunks = chunks_.get(), body_bytes_max](std::uint64_t size, beast::string_view extensions,
+                                                                beast::error_code& error) {
     chunks->has_data = true;
+    if (size > body_bytes_max - chunks->announced_bytes) {
+      error = beast::http::error::body_limit;
+      return;
+    }
+    chunks->announced_bytes += size;
     chunks->extension_bytes += extensions.size();
     if (extensions.size() > kExtensionBytesMax || chunks->extension_bytes > kExtensionBytesTotalMax) {
       error = beast::http::error::bad_chunk_extension;

@@ -1,7 +1,7 @@
 // gate_fuzz: bytes of a connection through the request gate: HeadScanner, examine, BodyReader, in pieces and at once.
 // Input:   one byte that says how the rest is cut, then what a client sends.
-// Promise checked: how bytes arrive changes nothing of what is accepted; what passes has one framing, one Host, a clean target, a body
-//                  within its bound; what is refused has a status and says why; bytes behind a body stay where they are.
+// Promise checked: how bytes arrive changes nothing; what passes has one framing, one Host, a clean target, a body within its bound; what
+//                  is refused has a status and says why; bytes behind a body stay where they are.
 #include <algorithm>
 #include <cstdlib>
 #include <string>
@@ -92,13 +92,8 @@ Body read_body(const RequestHead& head, std::string_view bytes, std::size_t step
   } else {
     result.rest.clear();
   }
-  // When a malformed body is refused, and for which of its faults, depends on which byte came last: Beast reads the line of a chunk whose
-  // extension opens a quote and never closes it again with every piece, and takes its size off the bound each time. Never accepted is what
-  // counts.
-  if (result.state == BodyReader::State::kRefused) {
-    check_refusal(reader.refusal());
-    result.state = BodyReader::State::kNeedMore;
-  }
+  // Which of several faults is told depends on which byte came last.
+  if (result.state == BodyReader::State::kRefused) check_refusal(reader.refusal());
   return result;
 }
 

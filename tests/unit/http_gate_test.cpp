@@ -257,6 +257,23 @@ Response dispatch(const Router& router, std::string method, std::string path) {
   return router.dispatch(request);
 }
 
+// Beast reads such a line again with every piece; each reading must not cost a part of the bound.
+TEST(HttpBodyReader, AnOpenQuoteIsReadAlikeInPiecesAndAtOnce) {
+  RequestHead head;
+  head.chunked = true;
+  const std::string bytes = "55;a;a=\"b\r\n\r\n" + std::string(60, 'x');
+  for (const std::size_t step : {bytes.size(), std::size_t{8}, std::size_t{1}}) {
+    BodyReader reader(head, 1000);
+    std::string input;
+    auto state = BodyReader::State::kNeedMore;
+    for (std::size_t at = 0; at < bytes.size() && state == BodyReader::State::kNeedMore; at += step) {
+      input += bytes.substr(at, step);
+      state = reader.feed(input);
+    }
+    EXPECT_EQ(state, BodyReader::State::kNeedMore) << step;
+  }
+}
+
 TEST(HttpRouter, PatternBeforeMethodLiteralBeforeCapture) {
   Router router;
   const auto named = [](std::string name) {
