@@ -2,6 +2,7 @@
 // Exit: 0 after SIGTERM or SIGINT; 1 if it cannot start (data locked, port taken); 2 if the configuration is wrong.
 #include <sched.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -9,12 +10,10 @@
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
-#include <future>
 #include <memory>
 #include <string>
 #include <thread>
 
-#include <spdlog/async.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
@@ -24,6 +23,7 @@
 #include "server/config.hpp"
 #include "server/http/server.hpp"
 #include "server/log.hpp"
+#include "server/log_sink.hpp"
 #include "server/store/identity.hpp"
 #include "server/token_command.hpp"
 
@@ -186,24 +186,6 @@ void set_logger(std::shared_ptr<spdlog::logger> logger) {
   spdlog::set_pattern("%Y-%m-%dT%H:%M:%S.%eZ %l %v", spdlog::pattern_time_type::utc);
 }
 
-// Lines are written by a thread of their own: whoever does not read standard error must not hold an I/O thread. When too many wait, the
-// oldest are lost.
-void write_log_aside() {
-  spdlog::init_thread_pool(kLogLinesMax, 1);
-  set_logger(spdlog::create_async_nb<spdlog::sinks::stderr_sink_mt>("colonyd serving"));
-}
-
-// Returns when all lines are out. If nobody takes them for kLogEnd, the process ends without them.
-void end_log(int status) {
-  const auto ended = std::make_shared<std::promise<void>>();
-  auto is_out = ended->get_future();
-  std::thread([ended] {
-    spdlog::shutdown();
-    ended->set_value();
-  }).detach();
-  if (is_out.wait_for(kLogEnd) != std::future_status::ready) std::_Exit(status);
-}
-
 int run(int argc, char** argv) {
   set_logger(spdlog::stderr_logger_mt("colonyd"));
   const auto invocation = configure(std::vector<std::string>(argv + 1, argv + argc), environment(), COLONY_VERSION,
@@ -218,9 +200,14 @@ int run(int argc, char** argv) {
   }
   if (invocation->token) return run_token_create(invocation->config, *invocation->token);
   const sigset_t signals = block_signals();  // before any thread
-  write_log_aside();
+  const auto tell_lost = [format = invocation->config.log_format](std::size_t lines) {
+    const std::string told = std::to_string(lines) + " lines of the log are lost: nobody took them";
+    return log_event(format, wall_time_text(), "warning", told).text;
+  };
+  const auto lines = std::make_shared<LogSink>(STDERR_FILENO, kLogLinesMax, tell_lost);
+  set_logger(std::make_shared<spdlog::logger>("colonyd serving", lines));
   const int status = serve(invocation->config, signals);
-  end_log(status);
+  if (!lines->end(kLogEnd)) std::_Exit(status);  // nobody takes them
   return status;
 }
 
