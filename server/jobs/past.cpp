@@ -13,8 +13,8 @@ namespace {
 
 constexpr std::size_t kPage = 2000;
 constexpr std::size_t kSeriesMax = 32;
-constexpr std::uint64_t kCurveEventsMax = 200'000;
-constexpr std::size_t kCurveRowsMax = 500'000;  // 40 MB
+constexpr std::size_t kCurveBytesMax = 256 << 20;
+constexpr std::size_t kCurveBytesACell = 700;  // the colony and its tracker (engine/DESIGN.md)
 
 /// Calls `use(event)` for every event with after < seq <= last, page by page.
 template <class Use>
@@ -44,17 +44,30 @@ Error does_not_fold(const JobRow& job, const std::exception& error) {
 
 }  // namespace
 
-/// The growth curve of a job that may go on: its row after every event, and the colony from which the next ones follow. A dashboard asks every
+/// The growth curve of a job that may go on: its row after every event that changes it, and the colony from which the next ones follow. A dashboard asks every
 /// few seconds for a curve that has grown by a few events, and its points then lie at other times: without all rows the whole history would
 /// be folded again.
 struct Past::Curve {
   Curve(const JobRow& job, const RunSpec& spec) : job_key(job.job_key), colony(spec.params), tracker(colony) {}
   const std::int64_t job_key;
-  std::atomic<std::size_t> size{0};  // of rows, for who does not hold the lock
-  std::mutex mutex;                  // guards everything below
+  std::atomic<std::size_t> bytes{0};  // for who does not hold the lock
+  std::mutex mutex;                   // guards everything below
   Colony colony;
   SeriesTracker tracker;
-  std::vector<SeriesRow> rows;  // after event 1, 2, 3, ...; each at the time of its event
+  struct Step {
+    std::uint64_t seq;
+    SeriesRow row;  // at the time of that event; the ones after it, up to the next step, leave all but the time as it is
+  };
+  std::vector<Step> steps;
+
+  void follow(const Event& event) {
+    colony.apply(event);
+    tracker.follow(event, colony);
+    const SeriesRow row = tracker.row(event.time_h);
+    SeriesRow last = steps.empty() ? SeriesRow{} : steps.back().row;
+    last.time_h = row.time_h;
+    if (!(row == last)) steps.push_back({event.seq, row});
+  }
 };
 
 Past::Past(Store& store, const SpecDecoder& decode, std::size_t colonies_max, std::uint64_t cells_max)
@@ -125,11 +138,11 @@ Result<std::vector<SeriesRow>> Past::series(const JobRow& job, std::size_t point
   const std::shared_ptr<Curve> curve = curve_of(job, *spec);
   auto rows = series_along(job, *curve, points);
   const std::lock_guard lock(mutex_);
-  std::size_t kept_rows = 0;
+  std::size_t kept_bytes = 0;
   curves_.remove_if([&](const std::shared_ptr<Curve>& one) {
-    const std::size_t size = one->size.load();
-    const bool is_too_much = (one == curve && !rows) || size > kCurveEventsMax || kept_rows + size > kCurveRowsMax;
-    if (!is_too_much) kept_rows += size;
+    const std::size_t bytes = one->bytes.load();
+    const bool is_too_much = (one == curve && !rows) || kept_bytes + bytes > kCurveBytesMax;
+    if (!is_too_much) kept_bytes += bytes;
     return is_too_much;
   });
   if (!rows) return rows;
@@ -152,12 +165,9 @@ std::shared_ptr<Past::Curve> Past::curve_of(const JobRow& job, const RunSpec& sp
 Result<std::vector<SeriesRow>> Past::series_along(const JobRow& job, Curve& curve, std::size_t points) {
   const std::lock_guard lock(curve.mutex);
   try {
-    const Status folded = for_each_event(store_, &stop_, job.job_key, curve.rows.size(), job.last_seq, [&](const Event& event) {
-      curve.colony.apply(event);
-      curve.tracker.follow(event, curve.colony);
-      curve.rows.push_back(curve.tracker.row(event.time_h));
-    });
-    curve.size = curve.rows.size();
+    const Status folded = for_each_event(store_, &stop_, job.job_key, curve.colony.last_seq(), job.last_seq,
+                                         [&](const Event& event) { curve.follow(event); });
+    curve.bytes = curve.colony.cells().size() * kCurveBytesACell + curve.steps.capacity() * sizeof(Curve::Step);
     if (!folded) return folded.error();
   } catch (const Stopped&) {
     return stopped();
@@ -167,13 +177,14 @@ Result<std::vector<SeriesRow>> Past::series_along(const JobRow& job, Curve& curv
   const double end_h = job.time_h;
   const std::size_t count = end_h > 0.0 ? points : 1;
   // Another question may have led the curve beyond the moment of this one.
-  const auto end = curve.rows.begin() + static_cast<std::ptrdiff_t>(job.last_seq);
+  const auto end = std::upper_bound(curve.steps.begin(), curve.steps.end(), job.last_seq,
+                                    [](std::uint64_t seq, const Curve::Step& step) { return seq < step.seq; });
   std::vector<SeriesRow> rows;
   for (std::size_t k = 0; k < count; ++k) {
     const double time_h = k + 1 == count ? end_h : end_h * static_cast<double>(k) / static_cast<double>(count - 1);
-    const auto next = std::upper_bound(curve.rows.begin(), end, time_h,
-                                       [](double at_h, const SeriesRow& row) { return at_h < row.time_h; });
-    rows.push_back(next == curve.rows.begin() ? SeriesRow{} : *std::prev(next));
+    const auto next = std::upper_bound(curve.steps.begin(), end, time_h,
+                                       [](double at_h, const Curve::Step& step) { return at_h < step.row.time_h; });
+    rows.push_back(next == curve.steps.begin() ? SeriesRow{} : std::prev(next)->row);
     rows.back().time_h = time_h;
   }
   return rows;

@@ -1,6 +1,6 @@
 // past: colonies and growth curves at past moments, folded from the stored events and kept for the next question.
 // Promise: what is kept has at most colonies_max colonies of cells_max cells together; a colony that is larger alone is not kept.
-//          Growth curves keep kCurveRowsMax rows together; a job of more than kCurveEventsMax events is folded at every question.
+//          Growth curves take kCurveBytesMax together; a job that is larger alone is folded at every question.
 // Method:  a fold starts from the nearest kept earlier fold of the same job, else from the first event.
 // Errors:  as the store's; kUnavailable after stop() for what is not kept; kInternal when a stored history does not fold (its digest chain is checked on the way).
 // Threads: every function from any thread; two threads may fold the same moment, and either answer is kept.
