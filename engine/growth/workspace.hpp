@@ -23,10 +23,12 @@ namespace colony {
 struct Work : kernel::CountWork {
   std::uint64_t search_count = 0;
   std::uint64_t candidate_count = 0;    // candidate pairs proposed; one that is its parent again keeps the score
+  std::uint64_t move_field_count = 0;   // of field_count: moves, made or not
   Work& operator+=(const Work& other) {
     CountWork::operator+=(other);
     search_count += other.search_count;
     candidate_count += other.candidate_count;
+    move_field_count += other.move_field_count;
     return *this;
   }
 };

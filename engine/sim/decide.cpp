@@ -188,7 +188,7 @@ Decision decide_settling(const Colony& colony, const Params& params, Seed seed, 
   event.nearest_membrane_um =
       nearest_membrane_um(body, neighbours, rule, event.nucleus_um, workspace.points, workspace.overlap, params.layers)
           .value_or(event.nucleus_um);
-  return {event, {workspace.overlap.work, 0, 0}};
+  return {event, {workspace.overlap.work, 0, 0, 0}};
 }
 
 }  // namespace colony

@@ -152,12 +152,12 @@ double per(double n, double d) { return d > 0.0 ? n / d : 0.0; }
 void print(const Scene& scene, int threads, const std::string& which, const Row& r) {
   const auto n = [](std::uint64_t count) { return static_cast<double>(count); };
   std::printf(
-      "%s,%d,%s,%s,%llu,%.1f,%.3f,%.3f,%.1f,%.1f,%.3f,%.1f,%.0f,%.0f,%.0f,%.3f,%.2f,%.1f,%.3f,%.0f,%.1f,%.1f,%s\n",
+      "%s,%d,%s,%s,%llu,%.1f,%.3f,%.3f,%.1f,%.1f,%.3f,%.1f,%.0f,%.0f,%.0f,%.0f,%.3f,%.2f,%.1f,%.3f,%.0f,%.1f,%.1f,%s\n",
       std::string(scene.name).c_str(), threads, r.target, which.c_str(), static_cast<unsigned long long>(r.cells),
       r.time_h, r.wall_s, r.cpu_s, per(n(r.cells), r.wall_s), per(n(r.divisions), r.wall_s),
       per(n(r.work.search_count), n(r.divisions)), per(n(r.work.candidate_count), n(r.divisions)),
-      per(n(r.work.field_count), n(r.divisions)), per(n(r.work.lookup_count), n(r.divisions)),
-      per(n(r.work.cover_count), n(r.divisions)), per(n(r.work.noise_count), n(r.work.field_count)),
+      per(n(r.work.field_count), n(r.divisions)), per(n(r.work.move_field_count), n(r.divisions)),
+      per(n(r.work.lookup_count), n(r.divisions)), per(n(r.work.cover_count), n(r.divisions)), per(n(r.work.noise_count), n(r.work.field_count)),
       per(1e9 * r.cpu_s, n(r.work.field_count)), per(r.area_um2, n(r.cells)), r.active, per(r.bytes, n(r.cells)),
       r.peak_mib, per(n(r.ready + r.freed), n(r.rounds)), r.digest);
   std::fflush(stdout);
@@ -166,7 +166,7 @@ void print(const Scene& scene, int threads, const std::string& which, const Row&
 constexpr const char* kHeader =
     "scene,threads,vector_target,run,cells,time_h,wall_s,cpu_s,cells_per_s,divisions_per_s,searches_per_division,"
     "candidates_per_division,"
-    "field_evaluations_per_division,lookups_per_division,covers_per_division,band_share,ns_per_evaluation,area_per_"
+    "field_evaluations_per_division,of_moves,lookups_per_division,covers_per_division,band_share,ns_per_evaluation,area_per_"
     "cell_um2,active_share,"
     "bytes_per_cell,peak_memory_mib,decisions_per_round,digest";
 
