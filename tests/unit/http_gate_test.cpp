@@ -274,6 +274,46 @@ TEST(HttpBodyReader, AnOpenQuoteIsReadAlikeInPiecesAndAtOnce) {
   }
 }
 
+TEST(HttpRouter, OptionsOfTheServerNameWhatThereIsAnywhere) {
+  Router router;
+  const auto nothing = [](const Request&) { return Response(); };
+  router.add("GET", "/", nothing);
+  router.add("GET", "/a", nothing);
+  router.add("DELETE", "/a/{}", nothing);
+  router.advertise("/", "Accept-Post", "x");
+  const Response server = dispatch(router, "OPTIONS", "*");
+  EXPECT_EQ(server.status, 204);
+  EXPECT_EQ(server.headers.get("Allow"), "GET, HEAD, DELETE, OPTIONS");
+  EXPECT_EQ(server.headers.count("Accept-Post"), 0u) << "that is of the root alone";
+  EXPECT_EQ(dispatch(router, "OPTIONS", "/").headers.get("Allow"), "GET, HEAD, OPTIONS");
+  EXPECT_EQ(dispatch(router, "OPTIONS", "/nowhere").status, 404);
+}
+
+TEST(HttpRouter, AnAnswered500IsReportedWithItsReason) {
+  Router router;
+  std::vector<std::string> heard;
+  router.on_failure([&heard](const Request& request, std::string_view what) { heard.push_back(request.request_id + " " + std::string(what)); });
+  const auto answers = [](int status, std::string failure) {
+    return [status, failure](const Request&) {
+      Response response;
+      response.status = status;
+      response.failure = failure;
+      return response;
+    };
+  };
+  router.add("GET", "/why", answers(500, "event 7 is not there"));
+  router.add("GET", "/mute", answers(500, ""));
+  router.add("GET", "/busy", answers(503, "not a bug"));
+  for (const char* path : {"/why", "/mute", "/busy"}) dispatch(router, "GET", path);
+  router.set_ready("GET", "/busy", [&](const Request& request) { return std::make_optional(answers(500, "at once")(request)); });
+  Request request;
+  request.method = "GET";
+  request.path = "/busy";
+  request.request_id = "id-2";
+  router.dispatch_ready(request);
+  EXPECT_EQ(heard, (std::vector<std::string>{"id-1 event 7 is not there", "id-1 a handler answered 500 and did not say why", "id-2 at once"}));
+}
+
 TEST(HttpRouter, PatternBeforeMethodLiteralBeforeCapture) {
   Router router;
   const auto named = [](std::string name) {
