@@ -53,15 +53,20 @@ TEST_F(WorkerPoolTest, LightWorkThatNeverEndsDoesNotStarveHeavyWork) {
 }
 
 TEST_F(WorkerPoolTest, HeavyWorkThatComesLateHasNoTurnsSavedUp) {
+  Door added;
   for (std::size_t i = 0; i < 3 * WorkerPool::kLightTurnsMax; ++i) add('r', false);
   pool.submit_request(
-      [this] {
+      [this, &added] {
         order += 'x';
         add('H', true);
         for (int i = 0; i < 4; ++i) add('r', false);
+        added.pass();
       },
       false);
-  run();
+  door.open();
+  added.wait_for_arrivals(1);  // a pool that is stopped takes no more
+  added.open();
+  pool.stop();
   EXPECT_EQ(order.substr(order.find('x')), "xrrrrH");
 }
 
