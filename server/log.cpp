@@ -37,22 +37,22 @@ LogLine log_event(LogFormat format, std::string_view time, std::string_view leve
   return json_line(level, {{"time", time}, {"level", level}, {"event", "message"}, {"message", safe(message)}});
 }
 
+// Whatever a client has chosen is searched for secrets: it may have put one in the wrong place.
 LogLine log_access(LogFormat format, std::string_view time, const http::AccessRecord& record) {
-  const std::string path = safe(record.path);
   if (format == LogFormat::kText) {
-    std::string text = record.method + " " + path + " " + std::to_string(record.status) + " " +
-                       std::to_string(record.duration_us) + " us " + std::to_string(record.body_bytes) + " B " +
-                       (record.actor.empty() ? "-" : record.actor) + " " + record.remote + " [" + record.request_id + "]";
-    return {"info", plain(text)};
+    const std::string text = record.method + " " + record.path + " " + std::to_string(record.status) + " " +
+                             std::to_string(record.duration_us) + " us " + std::to_string(record.body_bytes) + " B " +
+                             (record.actor.empty() ? "-" : record.actor) + " " + record.remote + " [" + record.request_id + "]";
+    return {"info", plain(safe(text))};
   }
-  const auto text_or_null = [](const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); };
+  const auto text_or_null = [](const std::string& text) { return text.empty() ? Json(nullptr) : Json(safe(text)); };
   return json_line("info", {{"time", time},
                             {"level", "info"},
                             {"event", "request"},
-                            {"request_id", record.request_id},
+                            {"request_id", safe(record.request_id)},
                             {"remote", record.remote},
                             {"method", safe(record.method)},
-                            {"path", path},
+                            {"path", safe(record.path)},
                             {"status", record.status},
                             {"duration_us", record.duration_us},
                             {"bytes", record.body_bytes},
@@ -61,18 +61,18 @@ LogLine log_access(LogFormat format, std::string_view time, const http::AccessRe
 }
 
 LogLine log_failure(LogFormat format, std::string_view time, const http::Request& request, std::string_view what) {
-  const std::string path = safe(request.path);
   if (format == LogFormat::kText) {
-    return {"error", plain(request.method + " " + path + " [" + request.request_id + "]: " + safe(what))};
+    const std::string text = request.method + " " + request.path + " [" + request.request_id + "]: " + std::string(what);
+    return {"error", plain(safe(text))};
   }
   return json_line("error", {{"time", time},
                              {"level", "error"},
                              {"event", "failure"},
-                             {"request_id", request.request_id},
-                             {"method", request.method},
-                             {"path", path},
+                             {"request_id", safe(request.request_id)},
+                             {"method", safe(request.method)},
+                             {"path", safe(request.path)},
                              {"message", safe(what)},
-                             {"actor", request.principal.name}});
+                             {"actor", safe(request.principal.name)}});
 }
 
 }  // namespace colony::server

@@ -22,7 +22,7 @@ struct LogLine {
 /// `time`: RFC 3339; it is in the JSON only (text gets its time from the sink).
 LogLine log_event(LogFormat format, std::string_view time, std::string_view level, std::string_view message);
 LogLine log_access(LogFormat format, std::string_view time, const http::AccessRecord& record);
-/// What a handler or a stream threw.
+/// What a handler or a stream threw, or why a handler answered 500.
 LogLine log_failure(LogFormat format, std::string_view time, const http::Request& request, std::string_view what);
 
 }  // namespace colony::server

@@ -22,6 +22,7 @@
 #include "server/api/handlers_tokens.hpp"
 #include "server/config.hpp"
 #include "server/http/server.hpp"
+#include "server/http/tls.hpp"
 #include "server/log.hpp"
 #include "server/log_sink.hpp"
 #include "server/store/identity.hpp"
@@ -120,6 +121,9 @@ void warn_of_settings(const Log& log, const Config& config, const http::TokenTab
            std::to_string(config.jobs.threads_per_job) + " threads a job");
   if (threads > usable_cores()) {
     log.warn(std::to_string(threads) + " threads are to share " + std::to_string(usable_cores()) + " cores");
+  }
+  if (!config.http.tls_key.empty()) {
+    if (const auto exposed = http::exposure_of_key(config.http.tls_key)) log.warn(*exposed);
   }
   if (config.http.tokens_required && tokens.count_alive(http::Scope::kAdmin, http::unix_time_ms()) == 0) {
     log.warn("no valid token has scope admin: stop the server and make one with `colonyd token create`");

@@ -11,7 +11,7 @@ namespace colony::server::api {
 /// The result of one queued analysis or comparison, or why there is none.
 AnalysisWorker::Outcome work_on(Context& context, const AnalysisRow& row, StopFlag stop);
 
-Effort effort_of(const Context& context);
+Effort effort_of(const Context& context, const Call& call);
 
 /// Stores, nudges the worker if there is something left to do, and answers 201 or 202.
 http::Response created(Context& context, const Call& call, const NewAnalysis& analysis);

@@ -1,7 +1,6 @@
 // What is checked before any handler runs, and the object that owns what handlers work with.
 #include "server/api/api.hpp"
 
-#include "engine/base/stop.hpp"
 #include "server/api/analysis_work.hpp"
 #include "server/api/codec_event.hpp"
 #include "server/api/docs.hpp"
@@ -119,6 +118,12 @@ void Api::add_routes(http::Router& router) {
                  return run_endpoint(endpoint, *context, request);
                },
                endpoint.is_heavy ? http::Router::Weight::kHeavy : http::Router::Weight::kLight, access_of(endpoint));
+    // Asked by who wants to know whether the process lives: not whether a worker is free.
+    if (endpoint.handler == &get_healthz) {
+      router.set_ready("GET", pattern, [&endpoint, context = context_.get()](const http::Request& request) {
+        return std::make_optional(run_endpoint(endpoint, *context, request));
+      });
+    }
     if (endpoint.handler == &get_job) {
       router.set_ready("GET", pattern, [&endpoint, context = context_.get()](const http::Request& request) {
         return answer_now(endpoint, *context, request);

@@ -15,6 +15,7 @@
 #include <string_view>
 #include <vector>
 
+#include "engine/base/stop.hpp"
 #include "server/api/codec_spec.hpp"
 #include "server/api/conditional.hpp"
 #include "server/api/problems.hpp"
@@ -70,7 +71,7 @@ struct Context {
   JobService& jobs;
   http::TokenTable& tokens;
   const ApiConfig config;
-  std::atomic<bool> draining{false};  // asks long computations to give up, too
+  std::atomic<bool> draining{false};  // long computations that nobody else would stop give up, too
   std::string schema_text;            // made once
   std::string openapi_text;
   std::atomic<bool> places_many{false};  // a submission of many founders is being checked
@@ -89,6 +90,8 @@ struct Call {
   Query query;
   std::string_view media;  // the media type to answer with
   std::optional<TagList> if_match = {}, if_none_match = {};
+  /// Set when nobody will take the answer; every long computation polls it. `context`: of the call.
+  StopFlag stop(const Context& context) const { return request.gives_up ? request.gives_up.get() : &context.draining; }
   /// The job id of the path.
   const std::string& id() const { return request.path_params.at(0); }
 };
@@ -142,7 +145,7 @@ class Api {
   Status start();
   /// The router keeps references to this object.
   void add_routes(http::Router& router);
-  /// From now on /readyz answers 503, and what takes long gives up and is answered with 503.
+  /// From now on /readyz answers 503. What takes long gives up as the http server stops (Request::gives_up), and is answered with 503.
   void drain();
 
  private:

@@ -113,7 +113,7 @@ http::Response post_analysis(Context& context, const Call& call) {
     pixels = decoded->pixel_count();
   }
   if (pixels <= kAnalysedAtOncePixelsMax) {
-    const auto measured = measure_picture(call.request.body, options, effort_of(context));
+    const auto measured = measure_picture(call.request.body, options, effort_of(context, call));
     if (!measured) return failure(as_body_error(measured.error()), call);
     analysis.result_json = to_text(encode_picture_result(*measured));
   }
@@ -186,7 +186,7 @@ http::Response get_analysis_objects(Context& context, const Call& call) {
   if (auto settled = settled_by_tag(call, tag)) return std::move(*settled);
   const auto image = store.image(call.id());
   if (!image) return failure(image.error(), call);
-  const auto objects = objects_of_picture(*image, decode_image_options(row->options_json), effort_of(context));
+  const auto objects = objects_of_picture(*image, decode_image_options(row->options_json), effort_of(context, call));
   if (!objects) return failure(as_body_error(objects.error()), call);
   const auto rows = shape_rows(*objects);
   if (!rows) return failure(as_body_error(rows.error()), call);
@@ -227,7 +227,7 @@ http::Response get_analysis_step(Context& context, const Call& call) {
   if (auto settled = settled_by_tag(call, tag)) return std::move(*settled);
   const auto image = store.image(call.id());
   if (!image) return failure(image.error(), call);
-  auto png = step_png(*image, decode_image_options(row->options_json), wanted, effort_of(context));
+  auto png = step_png(*image, decode_image_options(row->options_json), wanted, effort_of(context, call));
   if (!png) return failure(as_body_error(png.error()), call);
   http::Response response;
   response.headers.set("Content-Type", call.media);

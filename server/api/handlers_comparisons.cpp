@@ -71,7 +71,7 @@ AnalysisWorker::Outcome work_on(Context& context, const AnalysisRow& row, StopFl
   return {to_text(encode_picture_result(*measured)), {}, {}};
 }
 
-Effort effort_of(const Context& context) { return {context.config.jobs.threads_per_job, &context.draining}; }
+Effort effort_of(const Context& context, const Call& call) { return {context.config.jobs.threads_per_job, call.stop(context)}; }
 
 http::Response post_comparison(Context& context, const Call& call) {
   const auto body = parse_json(call.request.body);
@@ -107,7 +107,7 @@ http::Response post_comparison(Context& context, const Call& call) {
                         compared_px_estimate(*at->colony, *match) <= kComparedAtOncePixelsMax;
   if (is_small) {
     const auto made = compare(std::move(*at), source->image, decode_image_options(source->row.options_json), spec->match,
-                              effort_of(context));
+                              effort_of(context, call));
     if (!made) return failure(made.error(), call);
     comparison.result_json = to_text(encode_comparison(*made));
   }
@@ -135,7 +135,7 @@ http::Response get_comparison_figure(Context& context, const Call& call) {
   if (!moment) return failure(moment.error(), call);
   const std::string tag = derived_tag(context, call, moment->digest, moment->seq, row->id + " " + source->options_json);
   if (auto settled = settled_by_tag(call, tag)) return std::move(*settled);
-  const auto comparison = compare_again(context, *row, effort_of(context), Sweep::kLeaveOut);
+  const auto comparison = compare_again(context, *row, effort_of(context, call), Sweep::kLeaveOut);
   if (!comparison) return failure(comparison.error(), call);
   http::Response response;
   response.headers.set("Content-Type", call.media);

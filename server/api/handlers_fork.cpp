@@ -41,7 +41,7 @@ http::Response fork_job(Context& context, const Call& call) {
   if (target->job.kind != kColonyKind) return invalid(call, "only a colony can be forked; this job is of kind " + target->job.kind);
   if (auto refused = refuse_other_version(target->job, call)) return std::move(*refused);
   const auto origin = decode_stored_job_spec(target->job.spec_json);
-  if (!origin) return failure({ErrorCode::kInternal, "the stored spec cannot be used: " + origin.error().message, {}}, call);
+  if (!origin) return failure({ErrorCode::kInternal, "the stored spec of job " + target->job.id + " cannot be used: " + origin.error().message, {}}, call);
   const auto fork = decode_fork(*body, *origin, SpecLimits{context.config.jobs.cells_max});
   if (!fork) return failure(fork.error(), call);
   const auto point = context.jobs.fork_point(call.id(), fork->at_h, fork->at_seq);

@@ -69,7 +69,7 @@ http::Response post_job(Context& context, const Call& call) {
                                                      " founders is being checked; one at a time"},
                               call.request.request_id);
     }
-    if (const Status placed = check_founders(spec->run, &context.draining); !placed)
+    if (const Status placed = check_founders(spec->run, call.stop(context)); !placed)
       return failure(placed.error(), call);
   }
   if (call.query.boolean("dry_run", false)) {

@@ -84,11 +84,11 @@ http::Response get_image(Context& context, const Call& call) {
   const std::string tag = history_tag(context, call, *at);
   if (is_tiff) {
     MemoryFile file;
-    const Status written = write_ome_tiff(*at->colony, at->spec->params, spec, {}, effort_of(context), file);
+    const Status written = write_ome_tiff(*at->colony, at->spec->params, spec, {}, effort_of(context, call), file);
     return written ? bytes_response(call.media, file.bytes(), tag) : failure(written.error(), call);
   }
   std::string png;
-  const Status drawn = render_png(*at->colony, at->spec->params, spec, effort_of(context),
+  const Status drawn = render_png(*at->colony, at->spec->params, spec, effort_of(context, call),
                                   [&](std::string_view bytes) { png.append(bytes); });
   return drawn ? bytes_response(call.media, std::move(png), tag) : failure(drawn.error(), call);
 }
@@ -105,7 +105,7 @@ http::Response get_mesh(Context& context, const Call& call) {
   if (!at) return failure(at.error(), call);
   const auto given = call.query.integer("triangles_max");
   spec.triangles_max = given ? static_cast<std::int64_t>(*given) : mesh_triangles_default(at->colony->cells().size());
-  const auto mesh = build_mesh(*at->colony, at->spec->params.contact.rule, spec, effort_of(context));
+  const auto mesh = build_mesh(*at->colony, at->spec->params.contact.rule, spec, effort_of(context, call));
   if (!mesh) return failure(mesh.error(), call);
   auto glb = encode_glb(*mesh, *at->colony);
   return glb ? bytes_response(call.media, std::move(*glb), history_tag(context, call, *at)) : failure(glb.error(), call);
@@ -126,7 +126,7 @@ http::Response get_analysis_of_job(Context& context, const Call& call) {
   if (at->colony->cells().empty()) {
     return failure({ErrorCode::kNotReached, "there are no cells yet", {{"at_h", "nothing is founded yet"}}}, call);
   }
-  const Effort effort = effort_of(context);
+  const Effort effort = effort_of(context, call);
   const auto image = label_colony(*at->colony, spec, effort);
   if (!image) return failure(image.error(), call);
   if (call.media == "text/csv") {

@@ -145,7 +145,7 @@ http::Response get_lineage(Context& context, const Call& call) {
   if (auto settled = settled_by_history(context, call)) return std::move(*settled);
   auto at = context.jobs.colony_at(call.id(), call.query.number("at_h"));
   if (!at) return failure(at.error(), call);
-  auto lineage = read_lineage(context.jobs, call.id(), at->colony->last_seq(), &context.draining);
+  auto lineage = read_lineage(context.jobs, call.id(), at->colony->last_seq(), call.stop(context));
   if (!lineage) return failure(lineage.error(), call);
   std::unique_ptr<http::BodySource> source;
   if (call.media != "application/json") {

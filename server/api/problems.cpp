@@ -90,6 +90,7 @@ http::Response problem_response(ProblemKind kind, const Error& error, std::strin
   response.headers.set("Content-Type", "application/problem+json");
   if (row.retry_after_s > 0) response.headers.set("Retry-After", std::to_string(row.retry_after_s));
   response.body = to_text(body);
+  if (row.status == 500) response.failure = error.message;
   return response;
 }
 

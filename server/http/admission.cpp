@@ -101,6 +101,9 @@ std::optional<Refusal> Admission::admit(const Headers& headers, Access access, c
     return unauthorized("give a token in the header, Authorization: Bearer TOKEN", "");
   }
   if (headers.count("Authorization") > 1) {
+    // Counted as a wrong token: else whoever guesses would send each guess twice.
+    Refusal refusal = refuse_token(client, now, {});
+    if (refusal.status == 429) return refusal;
     return Refusal{400, "bad-request", "The request is malformed", "the header holds more than one Authorization"};
   }
   const std::size_t space = field->find(' ');

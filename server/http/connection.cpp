@@ -126,13 +126,22 @@ Awaitable<void> Connection::wait(Clock::time_point until) {
 void Connection::notify() { signal_.cancel(); }
 
 void Connection::watch_peer() {
-  if (watching_ || peer_has_closed_ || !socket_.is_open() || input_.size() >= kReadAheadBytesMax) return;
+  if (watching_ || peer_has_left_ || !socket_.is_open()) return;
+  if (!peer_has_closed_ && input_.size() >= kReadAheadBytesMax) return;
   watching_ = true;
-  socket_.async_wait(asio::ip::tcp::socket::wait_read,
-                     [self = shared_from_this(), generation = watch_generation_](error_code error) {
+  // Behind the end of its input an error is all that can come, and that is a reset.
+  const bool is_for_reset = peer_has_closed_;
+  socket_.async_wait(is_for_reset ? asio::ip::tcp::socket::wait_error : asio::ip::tcp::socket::wait_read,
+                     [self = shared_from_this(), generation = watch_generation_, is_for_reset](error_code error) {
                        if (generation != self->watch_generation_) return;
                        self->watching_ = false;
-                       if (!error) self->look_at_peer();
+                       if (error) return;
+                       if (!is_for_reset) {
+                         self->look_at_peer();
+                       } else {
+                         self->peer_has_left_ = true;
+                         self->notify();
+                       }
                      });
 }
 
@@ -155,6 +164,7 @@ void Connection::look_at_peer() {
     input_.append(bytes, count);
   } else if (error != asio::error::would_block && error != asio::error::try_again) {
     peer_has_closed_ = true;
+    peer_has_left_ = tls_ != nullptr || error != asio::error::eof;
     notify();
   }
   watch_peer();

@@ -60,11 +60,16 @@ class Connection : public std::enable_shared_from_this<Connection> {
   Awaitable<void> wait(Clock::time_point until);
   void notify();
 
-  /// While nothing is read or written: notify() when the peer closes. What it sends instead is kept in input(), up to a
-  /// bound; beyond that its closing is noticed at the next write.
+  /// While nothing is read: notify() when the peer closes, and again when it has left. What it sends instead is kept in input(), up to
+  /// a bound; beyond that either is noticed at the next write.
   void watch_peer();
   void unwatch_peer();
+  /// Its input has ended: it is gone, or it has shut down its sending side only. TCP does not tell one from the other before something
+  /// is sent: who is gone then answers with a reset.
   bool peer_has_closed() const { return peer_has_closed_; }
+  /// Nobody takes what is sent: after a reset, and under TLS after any end (RFC 5246, 7.2.1: who is told close_notify drops what it
+  /// would still have written).
+  bool peer_has_left() const { return peer_has_left_; }
 
   /// Ends our side and reads until the peer ends its own, for a short time: a close with unread bytes would send a
   /// reset, and that can reach the peer before it has read the answer.
@@ -88,6 +93,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
   bool deadline_has_passed_ = false;
   bool watching_ = false;
   bool peer_has_closed_ = false;
+  bool peer_has_left_ = false;
 };
 
 }  // namespace colony::server::http

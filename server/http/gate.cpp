@@ -140,9 +140,13 @@ Check read_addressee(std::string_view target, const GatePolicy& policy, RequestH
   if (!host) return bad_request("Host must be a host name or address, with or without a port");
 
   if (target.size() > policy.target_bytes_max) return target_too_long(policy.target_bytes_max);
-  auto parsed = parse_target(target);
-  if (!parsed) return bad_request(parsed.error().message);
-  head.target = std::move(*parsed);
+  if (target == kServerTarget && head.method == "OPTIONS") {
+    head.target.path = kServerTarget;
+  } else {
+    auto parsed = parse_target(target);
+    if (!parsed) return bad_request(parsed.error().message);
+    head.target = std::move(*parsed);
+  }
   if (head.target.authority) {
     if (!is_allowed(*head.target.authority, policy))
       return bad_request("the request target names a host that is not served here");

@@ -2,7 +2,7 @@
 // Why raw: a parser that has already folded lines, merged duplicates or dropped blanks hides exactly the shapes by
 //          which two readers of one connection come to disagree about where a request ends. Nothing here is lenient.
 // Promises that a head that passed has one framing (a length or chunked, never both), one allowed Host, no foreign
-//          Origin, a clean target, and a known method.
+//          Origin, a clean target (or "*" with OPTIONS, and no other method), and a known method.
 // Errors:  a Refusal, which the session sends as a problem document and then closes the connection.
 // Threads: pure functions over bytes; no socket is needed to test or to fuzz them.
 // Source:  RFC 9112, RFC 9110.

@@ -1,6 +1,7 @@
 // message: a request and a response as plain values, so that handlers need no socket and tests need no server.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <cstddef>
 #include <functional>
@@ -45,6 +46,8 @@ struct Request {
   std::string request_id;
   Principal principal;                                         // set before the body is read
   std::vector<std::string> path_params;                        // filled by the router, e.g. the job id
+  std::shared_ptr<const std::atomic<bool>> gives_up;           // becomes true when nobody will take the answer: the peer has left, or
+                                                               // the server drains; null: nobody says
 };
 
 /// A body that is made piece by piece. The session calls pull on a worker thread, never twice at once.
@@ -92,6 +95,7 @@ struct Response {
   std::string body;
   std::unique_ptr<BodySource> stream;                          // if set: sent chunked instead of body
   std::unique_ptr<LaterAnswer> later;                          // if set: nothing else counts, the answer comes from it
+  std::string failure;                                         // with status 500: what failed, for the server's own log; not sent
 };
 
 }  // namespace colony::server::http

@@ -4,6 +4,7 @@
 #include <exception>
 
 #include "engine/base/check.hpp"
+#include "server/http/target.hpp"
 #include "server/http/text.hpp"
 
 namespace colony::server::http {
@@ -93,12 +94,21 @@ void Router::add(std::string method, std::string pattern, Handler handler, Weigh
   routes_.push_back({std::move(method), std::move(segments), std::move(handler), weight, access});
 }
 
-Access Router::access_of(std::string_view method, const std::string& path) const {
-  if (method == "OPTIONS") return Access::kOpen;
-  const auto* const pattern = pattern_of(split(path));
-  const Route* const route = pattern ? route_of(*pattern, method) : nullptr;
-  return route ? route->access : Access::kRead;
+Router::Destination Router::find(std::string_view method, std::string_view path) const {
+  Destination to;
+  to.is_server = path == kServerTarget;
+  to.path = split(path);
+  to.pattern = to.is_server ? nullptr : pattern_of(to.path);
+  to.route = to.pattern ? route_of(*to.pattern, method) : nullptr;
+  return to;
 }
+
+Access Router::access_of(std::string_view method, const Destination& to) {
+  if (method == "OPTIONS") return Access::kOpen;
+  return to.route ? to.route->access : Access::kRead;
+}
+
+bool Router::is_heavy(const Destination& to) { return to.route != nullptr && to.route->weight == Weight::kHeavy; }
 
 void Router::set_ready(std::string_view method, const std::string& pattern, ReadyHandler handler) {
   const auto segments = split(pattern);
@@ -109,16 +119,15 @@ void Router::set_ready(std::string_view method, const std::string& pattern, Read
   ready_.emplace_back(static_cast<std::size_t>(route - routes_.begin()), std::move(handler));
 }
 
-std::optional<Response> Router::dispatch_ready(Request& request) const {
-  const auto path = split(request.path);
-  const std::vector<std::string>* const pattern = pattern_of(path);
-  const Route* const route = pattern ? route_of(*pattern, request.method) : nullptr;
-  if (!route) return std::nullopt;
-  const auto ready = std::find_if(ready_.begin(), ready_.end(), [&](const auto& one) { return &routes_[one.first] == route; });
+std::optional<Response> Router::dispatch_ready(Request& request, const Destination& to) const {
+  if (!to.route) return std::nullopt;
+  const auto ready = std::find_if(ready_.begin(), ready_.end(), [&](const auto& one) { return &routes_[one.first] == to.route; });
   if (ready == ready_.end()) return std::nullopt;
-  request.path_params = captures(*pattern, path);
+  request.path_params = captures(*to.pattern, to.path);
   try {
-    return ready->second(request);
+    auto response = ready->second(request);
+    if (response) report_if_failed(request, *response);
+    return response;
   } catch (const std::exception&) {
     return std::nullopt;  // memory, say: a worker tries again and reports
   }
@@ -130,6 +139,11 @@ void Router::advertise(std::string_view pattern, std::string name, std::string v
 
 void Router::report_failure(const Request& request, std::string_view what) const {
   if (failure_log_) failure_log_(request, what);
+}
+
+void Router::report_if_failed(const Request& request, const Response& response) const {
+  if (response.status != 500) return;
+  report_failure(request, response.failure.empty() ? "a handler answered 500 and did not say why" : response.failure);
 }
 
 // The pattern is chosen before the method: DELETE /v1/jobs/counts must not fall through to the job named "counts".
@@ -152,46 +166,47 @@ const Router::Route* Router::route_of(const std::vector<std::string>& pattern, s
   return head;
 }
 
-bool Router::is_heavy(const Request& request) const {
-  const auto* const pattern = pattern_of(split(request.path));
-  const Route* const route = pattern ? route_of(*pattern, request.method) : nullptr;
-  return route != nullptr && route->weight == Weight::kHeavy;
+std::string Router::allow_of(const Destination& to) const {
+  std::string allow;
+  for (const auto& route : routes_) {
+    if (!to.is_server && route.segments != *to.pattern) continue;
+    for (const std::string_view method : {std::string_view(route.method), std::string_view(route.method == "GET" ? "HEAD" : "")}) {
+      if (!method.empty() && !list_holds(allow, method)) allow.append(allow.empty() ? "" : ", ").append(method);
+    }
+  }
+  return allow + (allow.empty() ? "OPTIONS" : ", OPTIONS");
 }
 
-Response Router::dispatch(Request& request) const {
-  const auto path = split(request.path);
-  const std::vector<std::string>* const pattern = pattern_of(path);
-  if (!pattern) {
+Response Router::answer_options(const Destination& to) const {
+  Response response;
+  response.status = 204;
+  for (const auto& advert : adverts_) {
+    if (to.pattern && advert.segments == *to.pattern) response.headers.set(advert.name, advert.value);
+  }
+  response.headers.set("Allow", allow_of(to));
+  return response;
+}
+
+Response Router::dispatch(Request& request, const Destination& to) const {
+  if (!to.route && request.method == "OPTIONS" && (to.pattern || to.is_server)) return answer_options(to);
+  if (!to.pattern) {
     return problem(404, "not-found", "There is nothing here", "no resource has the path " + request.path,
                    request.request_id);
   }
-
-  const Route* const chosen = route_of(*pattern, request.method);
-  std::string allow;
-  for (const auto& route : routes_) {
-    if (route.segments != *pattern) continue;
-    allow += (allow.empty() ? "" : ", ") + route.method + (route.method == "GET" ? ", HEAD" : "");
-  }
-  allow += ", OPTIONS";
-  if (!chosen) {
-    Response response;
-    if (request.method == "OPTIONS") {
-      response.status = 204;
-      for (const auto& advert : adverts_) {
-        if (advert.segments == *pattern) response.headers.set(advert.name, advert.value);
-      }
-    } else {
-      response = problem(405, "method-not-allowed", "The method is not allowed here",
-                         request.path + " does not take " + request.method + ", but " + allow, request.request_id);
-    }
+  if (!to.route) {
+    const std::string allow = allow_of(to);
+    Response response = problem(405, "method-not-allowed", "The method is not allowed here",
+                                request.path + " does not take " + request.method + ", but " + allow, request.request_id);
     response.headers.set("Allow", allow);
     return response;
   }
 
-  request.path_params = captures(*pattern, path);
+  request.path_params = captures(*to.pattern, to.path);
   std::string what = "an exception that is not a std::exception";
   try {
-    return chosen->handler(request);
+    Response response = to.route->handler(request);
+    report_if_failed(request, response);
+    return response;
   } catch (const std::exception& error) {
     what = error.what();
   } catch (...) {

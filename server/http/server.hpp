@@ -50,6 +50,9 @@ struct ServerConfig {
   std::int64_t stream_keep_alive_ms = 15'000;  // of a stream that waits
 };
 
+/// In the log only: the peer had left, the work was given up or never begun. The number by which other servers' logs know it.
+inline constexpr int kPeerHasLeft = 499;
+
 /// Called once per finished request, for the log (any thread).
 struct AccessRecord {
   std::string method, path, request_id, remote;
@@ -69,7 +72,8 @@ class Server {
   virtual std::uint16_t port() const = 0;
   /// Starts the threads; returns at once.
   virtual void run() = 0;
-  /// No new connections; streams get their farewell; answers under way are finished for up to `grace_ms`; then all is closed.
+  /// No new connections; streams get their farewell; handlers under way are asked to give up (Request::gives_up), their answers are
+  /// waited for up to `grace_ms`; then all is closed.
   virtual void stop(std::int64_t grace_ms) = 0;
 };
 

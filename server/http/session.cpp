@@ -8,7 +8,6 @@
 #include <boost/asio/post.hpp>
 
 #include "server/http/body_reader.hpp"
-#include "server/http/guarded_source.hpp"
 
 namespace colony::server::http {
 namespace asio = boost::asio;
@@ -19,9 +18,6 @@ using Io = Connection::Io;
 constexpr std::size_t kHeadReadBytes = 4 * 1024;
 constexpr std::size_t kBodyReadBytes = 64 * 1024;
 constexpr std::size_t kIdleInputBytesMax = 16 * 1024;   // an idle connection keeps no larger buffer
-// What pages of listed sites may send beyond what any page may.
-constexpr std::string_view kCorsRequestHeaders =
-    "Authorization, Content-Type, Idempotency-Key, If-Match, If-None-Match, Last-Event-ID, Prefer, X-Request-Id";
 constexpr std::size_t kJoinedBodyBytesMax = 32 * 1024;  // up to here head and body are sent in one write
 
 std::uint64_t random_64() {
@@ -72,6 +68,7 @@ void Session::on_strand(std::function<void()> task) { asio::post(connection_->ex
 void Session::drain() {
   on_strand([self = shared_from_this()] {
     self->draining_ = true;
+    if (self->gives_up_) *self->gives_up_ = true;
     // A request whose header is incomplete has not begun: its sender may safely repeat it elsewhere.
     if (self->phase_ != Phase::kAnswering) self->connection_->close();
     self->connection_->notify();
@@ -80,7 +77,10 @@ void Session::drain() {
 
 void Session::close() {
   closing_ = true;
-  on_strand([self = shared_from_this()] { self->connection_->close(); });
+  on_strand([self = shared_from_this()] {
+    if (self->gives_up_) *self->gives_up_ = true;
+    self->connection_->close();
+  });
 }
 
 Awaitable<void> Session::run(std::shared_ptr<Session> self) {
@@ -104,6 +104,7 @@ Awaitable<bool> Session::serve_one() {
   request_ = Request();
   response_ = Response();
   refusal_.reset();
+  gives_up_.reset();
   is_inside_ = false;
   is_admitted_ = false;
   forwarded_.clear();
@@ -113,6 +114,7 @@ Awaitable<bool> Session::serve_one() {
   served_before_ = true;
   if (!refusal_) {
     is_inside_ = fill_request();
+    if (is_inside_) destination_ = shared_.router.find(request_.method, request_.path);
     refusal_ = admit();
   }
   if (!refusal_) {
@@ -180,7 +182,7 @@ std::optional<Refusal> Session::admit() {
   const ClientAddress client = is_forwarded ? forwarded_address(head_.headers, peer_) : peer_;
   if (is_forwarded) forwarded_ = client.text;
   // What lies outside the base path is nowhere.
-  const Access access = is_inside_ ? shared_.router.access_of(request_.method, request_.path) : Access::kRead;
+  const Access access = is_inside_ ? Router::access_of(request_.method, destination_) : Access::kRead;
   auto refusal =
       shared_.admission.admit(head_.headers, access, client, Admission::Moment::now(), request_.principal);
   if (refusal) return refusal;
@@ -234,69 +236,13 @@ bool Session::fill_request() {
   request_.query = head_.target.query;
   request_.headers = head_.headers;
   const std::string& base = shared_.config.base_path;
-  if (base.empty()) return true;
+  if (base.empty() || request_.path == kServerTarget) return true;
   const bool is_inside = request_.path.compare(0, base.size(), base) == 0 &&
                          (request_.path.size() == base.size() || request_.path[base.size()] == '/');
   if (!is_inside) return false;
   request_.path.erase(0, base.size());
   if (request_.path.empty()) request_.path = "/";
   return true;
-}
-
-WorkerPool::Task Session::as_worker_task(std::function<void()> work) {
-  worker_is_done_ = false;
-  return [self = shared_from_this(), work = std::move(work)] {
-    if (!self->closing_) work();
-    self->on_strand([self] {
-      self->worker_is_done_ = true;
-      self->connection_->notify();
-    });
-  };
-}
-
-// Also a closed session waits: the worker still uses request_, response_ or piece_.
-Awaitable<void> Session::wait_for_worker() {
-  while (!worker_is_done_) co_await connection_->wait(Connection::Clock::time_point::max());
-}
-
-Awaitable<void> Session::handle() {
-  if (auto ready = shared_.router.dispatch_ready(request_)) {
-    response_ = std::move(*ready);
-    co_return;
-  }
-  auto task = as_worker_task([this] { response_ = shared_.router.dispatch(request_); });
-  const bool is_queued = shared_.workers.submit_request(std::move(task), shared_.router.is_heavy(request_));
-  if (is_queued) {
-    co_await wait_for_worker();
-    if (response_.later) co_await wait_for_later();
-  } else {
-    refusal_ =
-        Refusal{503, "overloaded", "The server is busy", "too many requests wait already; try again in a second"};
-  }
-}
-
-// A token may have ended while the answer was made. What was done was done by right; what was found is not told any more.
-void Session::settle_answer() {
-  const TokenTable& tokens = shared_.admission.tokens();
-  const Principal& who = request_.principal;
-  const bool is_question = head_.method == "GET" || head_.method == "HEAD";
-  if (is_question && !who.token_id.empty() && !tokens.is_alive(who.token_id, unix_time_ms())) {
-    let_go_of_stream();
-    refusal_ = token_has_ended();
-    return;
-  }
-  if (response_.stream) response_.stream = guarded(std::move(response_.stream), tokens, who);
-  answer_preflight();
-}
-
-// A browser asks so before it lets a page of a listed site ask. The router's answer to OPTIONS says the methods.
-void Session::answer_preflight() {
-  const bool is_preflight = head_.method == "OPTIONS" && !head_.cors_origin.empty() &&
-                            head_.headers.count("Access-Control-Request-Method") != 0;
-  if (!is_preflight || response_.status != 204) return;
-  response_.headers.set("Access-Control-Allow-Methods", response_.headers.get("Allow").value_or(""));
-  response_.headers.set("Access-Control-Allow-Headers", kCorsRequestHeaders);
-  response_.headers.set("Access-Control-Max-Age", "600");
 }
 
 void Session::prepare_response() {
@@ -315,6 +261,12 @@ void Session::prepare_response() {
 }
 
 Awaitable<bool> Session::answer() {
+  if (is_abandoned_) {
+    let_go_of_stream();
+    response_ = Response();
+    response_.status = kPeerHasLeft;
+    write_log();
+  }
   if (closing_) co_return false;
   prepare_response();
   WireOptions options;

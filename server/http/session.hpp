@@ -1,7 +1,8 @@
 // session: the requests of one connection, one after the other: gate, admission, body, router, answer.
 // Promises that nothing of a handler or a stream runs on an I/O thread but what is in memory already (pull_now); that every
 //          request is answered in order, or the connection is closed; that a stream holds a worker only while it is
-//          pulled, and is never pulled while its last piece is still being sent; and that it ends soon after close().
+//          pulled, and is never pulled while its last piece is still being sent; that it ends soon after close(); and that
+//          nothing is begun for a peer that has left, and what was begun is asked to give up.
 // Does not keep a connection after a refusal: where the next request begins is then a matter of trust.
 // Threads: start, drain and close from any thread; everything else on the connection's strand, but for the tasks of
 //          workers, which touch request_, response_ and piece_ while the session waits for them.
@@ -71,13 +72,15 @@ class Session : public std::enable_shared_from_this<Session> {
   Awaitable<bool> serve_one();  // false: the connection is over
   Awaitable<bool> read_head();  // false: nothing is left to answer, here and below
   Awaitable<bool> read_body();
-  Awaitable<void> handle();
+  Awaitable<void> handle();  // session_handle.cpp, with all that waits for a handler
   Awaitable<bool> answer();
   Awaitable<bool> send_plain(const std::string& head);
   Awaitable<bool> send_stream(Framing framing);
   Awaitable<bool> send_piece(Framing framing, std::string_view shared, std::string_view own);
   Awaitable<void> wait_for_stream(std::string_view farewell, Connection::Clock::time_point until);
   Awaitable<void> wait_for_worker();
+  Awaitable<void> wait_for_handler(WorkerPool::Ticket ticket);
+  void abandon(WorkerPool::Ticket ticket);
   Awaitable<void> wait_for_later();  // session_later.cpp
   void ask_later(bool is_first, bool is_last);
 
@@ -85,6 +88,8 @@ class Session : public std::enable_shared_from_this<Session> {
   std::optional<Refusal> take_large_body();
   void give_back_large_body();
   bool fill_request();
+  bool is_question() const { return head_.method == "GET" || head_.method == "HEAD"; }
+  bool has_lost_its_token() const;  // a question that will not be answered any more
   void settle_answer();
   void answer_preflight();
   WorkerPool::Task as_worker_task(std::function<void()> work);
@@ -110,9 +115,12 @@ class Session : public std::enable_shared_from_this<Session> {
   RequestHead head_;
   std::optional<Refusal> refusal_;
   bool is_inside_ = false;    // under base_path
+  Router::Destination destination_;
   bool is_admitted_ = false;  // request_.principal is who asks
   std::string forwarded_;   // the client's address, if a trusted proxy says it
   Request request_;
+  std::shared_ptr<std::atomic<bool>> gives_up_;  // of request_, once a worker has it
+  bool is_abandoned_ = false;                    // its peer left before the answer
   Response response_;
   bool keep_alive_ = false;
   bool holds_large_body_ = false;

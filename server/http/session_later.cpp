@@ -1,8 +1,9 @@
 // The part of a session that waits for an answer which is not there yet. It holds a worker only while the answer is asked for.
+#include <algorithm>
 #include <exception>
 #include <utility>
 
-#include "server/http/session.hpp"
+#include "server/http/session_waker.hpp"
 
 namespace colony::server::http {
 
@@ -10,16 +11,9 @@ namespace colony::server::http {
 void Session::ask_later(bool is_first, bool is_last) {
   std::string what = "a later answer threw what is not a std::exception";
   try {
-    if (is_first) {
-      // No wake comes after the answer is destroyed, and this session's coroutine outlives it.
-      response_.later->on_ready([this] {
-        on_strand([self = shared_from_this()] {
-          self->woken_ = true;
-          self->connection_->notify();
-        });
-      });
-    }
+    if (is_first) response_.later->on_ready([waker = waker_] { waker->wake(); });
     late_ = response_.later->ask(is_last);
+    if (late_) shared_.router.report_if_failed(request_, *late_);
     if (late_ || !is_last) return;
     what = "a later answer gave none in the end";
   } catch (const std::exception& error) {
@@ -31,22 +25,37 @@ void Session::ask_later(bool is_first, bool is_last) {
                                              "the server's log has more under this request_id", head_.request_id));
 }
 
+// It also ends with the token that asked: settle_answer tells.
 Awaitable<void> Session::wait_for_later() {
+  const TokenTable& tokens = shared_.admission.tokens();
+  const std::string& token_id = request_.principal.token_id;
   const auto until = Connection::Clock::now() + response_.later->wait_max();
+  waker_ = std::make_shared<Waker>(this);
+  // Before the token is looked at: a removal in between is seen then.
+  const bool ends_with_token = is_question() && !token_id.empty();
+  const auto watch = ends_with_token ? tokens.watch(token_id, [waker = waker_] { waker->wake(); }) : nullptr;
   bool is_first = true;
   bool is_last = false;
-  for (;;) {
+  while (!has_lost_its_token()) {
     woken_ = false;  // before asking: a wake that comes meanwhile must lead to another question
     auto task = as_worker_task([this, is_first, is_last] { ask_later(is_first, is_last); });
     shared_.workers.submit_pull(std::move(task));
     co_await wait_for_worker();
     is_first = false;
     if (late_ || closing_) break;
-    connection_->watch_peer();
-    while (!woken_ && !closing_ && !draining_ && !connection_->peer_has_closed() && Connection::Clock::now() < until) {
-      co_await connection_->wait(until);
+    auto look_at = until;
+    if (ends_with_token) {
+      const std::chrono::milliseconds left(std::max<std::int64_t>(1, tokens.expires_unix_ms(token_id) - unix_time_ms()));
+      look_at = std::min(look_at, Connection::Clock::now() + left);
     }
-    if (connection_->peer_has_closed()) close();
+    connection_->watch_peer();
+    while (!woken_ && !closing_ && !draining_ && !connection_->peer_has_closed() && Connection::Clock::now() < look_at) {
+      co_await connection_->wait(look_at);
+    }
+    if (connection_->peer_has_closed()) {
+      is_abandoned_ = true;
+      close();
+    }
     if (closing_) break;
     is_last = draining_ || Connection::Clock::now() >= until;
   }
@@ -60,6 +69,8 @@ Awaitable<void> Session::wait_for_later() {
     });
   });
   co_await wait_for_worker();
+  waker_->detach();
+  waker_.reset();
   if (late_) response_ = std::move(*late_);
   late_.reset();
 }

@@ -3,47 +3,13 @@
 #include <exception>
 #include <utility>
 
-#include "server/http/session.hpp"
+#include "server/http/session_waker.hpp"
 
 namespace colony::server::http {
 
 using Io = Connection::Io;
 
 constexpr std::string_view kNothing;
-
-// Stands between a source, which may wake whenever it likes and from any thread, and a session that may have ended.
-// Calls that come before the session has looked are one call.
-class Session::Waker {
- public:
-  explicit Waker(Session* session) : session_(session) {}
-
-  void wake() {
-    const std::lock_guard lock(mutex_);
-    if (!session_ || is_pending_) return;
-    is_pending_ = true;
-    // Attached means that the session's coroutine runs, and that holds the session.
-    session_->on_strand([session = session_->shared_from_this(), waker = session_->waker_] {
-      waker->has_arrived();
-      session->woken_ = true;
-      session->connection_->notify();
-    });
-  }
-
-  void detach() {
-    const std::lock_guard lock(mutex_);
-    session_ = nullptr;
-  }
-
- private:
-  void has_arrived() {
-    const std::lock_guard lock(mutex_);
-    is_pending_ = false;
-  }
-
-  std::mutex mutex_;  // guards everything below
-  Session* session_;  // null: detached
-  bool is_pending_ = false;
-};
 
 // On a worker. What the source throws ends the connection without the last chunk, so that the client sees that
 // the body is truncated.

@@ -32,6 +32,9 @@ struct Target {
   std::vector<std::pair<std::string, std::string>> query;
 };
 
+/// What OPTIONS may have instead of a path: the server itself (RFC 9110, 9.3.7).
+inline constexpr std::string_view kServerTarget = "*";
+
 /// Origin form ("/v1/jobs?x=1") or absolute form with scheme http. In a query '+' is a space, as in HTML forms.
 Result<Target> parse_target(std::string_view text);
 

@@ -1,5 +1,6 @@
 #include "server/http/tokens.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <cstring>
 #include <utility>
@@ -66,18 +67,22 @@ TokenHash hash_of_token(std::string_view token) {
   return hash;
 }
 
-// Any run of hexadecimal digits behind the prefix, also one cut short: half a secret is half a secret too many.
+// A run of hexadecimal digits is hidden whole, also behind the prefix one that was cut short: half a secret is half a secret too many.
+// In either case of letters: who reads it can write it in the other.
 std::string without_tokens(std::string_view text) {
+  constexpr std::size_t kPartDigits = 8;  // "colony_face" is no secret
   std::string out;
-  for (std::size_t at = text.find(kPrefix); at != std::string_view::npos; at = text.find(kPrefix)) {
-    std::size_t end = at + kPrefix.size();
+  std::size_t at = 0;
+  while (at < text.size()) {
+    std::size_t end = at;
     while (end < text.size() && hex_value(text[end]) >= 0) ++end;
-    const bool is_word = end - at - kPrefix.size() < 8;  // "colony_face" is no secret
-    out.append(text.substr(0, is_word ? end : at + kPrefix.size()));
-    if (!is_word) out += "[hidden]";
-    text.remove_prefix(end);
+    const std::string_view before = std::string_view(out).substr(out.size() - std::min(out.size(), kPrefix.size()));
+    const bool is_secret = end - at >= 2 * kSecretBytes || (end - at >= kPartDigits && equals_without_case(before, kPrefix));
+    out += is_secret ? std::string_view("[hidden]") : text.substr(at, end - at);
+    if (end < text.size()) out += text[end++];
+    at = end;
   }
-  return out.append(text);
+  return out;
 }
 
 std::string_view name_of(Scope scope) { return kScopeNames[static_cast<std::size_t>(scope)]; }

@@ -17,20 +17,40 @@ void WorkerPool::start() {
   for (std::size_t i = 0; i < thread_count_; ++i) threads_.emplace_back([this] { work(); });
 }
 
-bool WorkerPool::submit_request(Task task, bool is_heavy) {
+WorkerPool::Ticket WorkerPool::submit_request(Task task, bool is_heavy) {
+  Ticket ticket = 0;
   {
     const std::lock_guard lock(mutex_);
-    if (stopping_ || (is_heavy ? heavy_.size() >= heavy_waiting_max_ : requests_.size() >= requests_waiting_max_)) return false;
-    (is_heavy ? heavy_ : requests_).push_back(std::move(task));
+    auto& queue = is_heavy ? heavy_ : requests_;
+    if (stopping_ || queue.size() >= (is_heavy ? heavy_waiting_max_ : requests_waiting_max_)) return 0;
+    ticket = ++ticket_count_;
+    queue.push_back({ticket, std::move(task)});
   }
   changed_.notify_one();
+  return ticket;
+}
+
+bool WorkerPool::withdraw(Ticket ticket) {
+  Task task;  // what it holds is let go outside the lock
+  {
+    const std::lock_guard lock(mutex_);
+    for (auto* const queue : {&requests_, &heavy_}) {
+      const auto waiting = std::find_if(queue->begin(), queue->end(), [ticket](const Waiting& one) { return one.ticket == ticket; });
+      if (waiting == queue->end()) continue;
+      task = std::move(waiting->task);
+      queue->erase(waiting);
+      break;
+    }
+  }
+  if (!task) return false;
+  changed_.notify_all();  // stop() may have waited for the last of the heavy ones
   return true;
 }
 
 void WorkerPool::submit_pull(Task task) {
   {
     const std::lock_guard lock(mutex_);
-    pulls_.push_back(std::move(task));
+    pulls_.push_back({0, std::move(task)});
   }
   changed_.notify_one();
 }
@@ -45,6 +65,18 @@ void WorkerPool::stop() {
   threads_.clear();
 }
 
+// Light work first, in turns; a heavy request where a thread has nothing else to do, or has kept one waiting long enough.
+WorkerPool::Kind WorkerPool::next_kind() {
+  if (may_run_heavy() && ((requests_.empty() && pulls_.empty()) || light_turns_ >= kLightTurnsMax)) {
+    light_turns_ = 0;
+    return Kind::kHeavy;
+  }
+  light_turns_ = may_run_heavy() ? light_turns_ + 1 : 0;
+  const bool take_pull = !pulls_.empty() && (pull_is_next_ || requests_.empty());
+  pull_is_next_ = !take_pull;
+  return take_pull ? Kind::kPull : Kind::kRequest;
+}
+
 void WorkerPool::work() {
   std::unique_lock lock(mutex_);
   for (;;) {
@@ -52,19 +84,16 @@ void WorkerPool::work() {
       return !requests_.empty() || !pulls_.empty() || may_run_heavy() || (stopping_ && heavy_.empty());
     });
     if (requests_.empty() && pulls_.empty() && !may_run_heavy()) return;
-    // Light work first, in turns; a heavy request only where a thread has nothing else to do.
-    const bool take_heavy = requests_.empty() && pulls_.empty();
-    const bool take_pull = !take_heavy && !pulls_.empty() && (pull_is_next_ || requests_.empty());
-    if (!take_heavy) pull_is_next_ = !take_pull;
-    auto& queue = take_heavy ? heavy_ : take_pull ? pulls_ : requests_;
-    Task task = std::move(queue.front());
+    const Kind kind = next_kind();
+    auto& queue = kind == Kind::kHeavy ? heavy_ : kind == Kind::kPull ? pulls_ : requests_;
+    Task task = std::move(queue.front().task);
     queue.pop_front();
-    if (take_heavy) ++heavy_running_;
+    if (kind == Kind::kHeavy) ++heavy_running_;
     lock.unlock();
     task();
     task = nullptr;  // what it held is let go outside the lock
     lock.lock();
-    if (take_heavy) {
+    if (kind == Kind::kHeavy) {
       --heavy_running_;
       changed_.notify_all();  // a heavy request may have waited for this, and stop() for the last of them
     }

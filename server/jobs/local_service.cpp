@@ -272,7 +272,7 @@ Result<Moment> LocalJobService::moment(const std::string& id, std::optional<doub
     just_before.after = *seq - 1;
     const auto event = store_.read_events(moment.job.job_key, just_before, 1);
     if (!event) return event.error();
-    if (event->empty()) return Error{ErrorCode::kInternal, "the stored history lacks event " + std::to_string(*seq)};
+    if (event->empty()) return Error{ErrorCode::kInternal, "the stored history of job " + moment.job.id + " lacks event " + std::to_string(*seq)};
     moment.digest = event->front().digest;
   }
   return moment;

@@ -16,30 +16,38 @@ constexpr std::size_t kSeriesMax = 32;
 constexpr std::size_t kCurveBytesMax = 256 << 20;
 constexpr std::size_t kCurveBytesACell = 700;  // the colony and its tracker (engine/DESIGN.md)
 
-/// Calls `use(event)` for every event with after < seq <= last, page by page.
+Error stopped() { return {ErrorCode::kUnavailable, "the server is shutting down"}; }
+
+Error does_not_fold(const JobRow& job, std::uint64_t seq, const std::string& why) {
+  return {ErrorCode::kInternal,
+          "the stored history of job " + job.id + " does not fold at event " + std::to_string(seq) + ": " + why};
+}
+
+Error spec_is_unusable(const JobRow& job, const Error& error) {
+  return {ErrorCode::kInternal, "the stored spec of job " + job.id + " cannot be used: " + error.message};
+}
+
+/// Calls `use(event)` for every event with after < seq <= last, page by page. What it throws becomes an error that names the event.
 template <class Use>
-Status for_each_event(Store& store, StopFlag stop, std::int64_t job_key, std::uint64_t after, std::uint64_t last,
-                      Use use) {
+Status for_each_event(Store& store, StopFlag stop, const JobRow& job, std::uint64_t after, std::uint64_t last, Use use) {
   EventFilter filter;
   filter.after = after;
   while (filter.after < last) {
     throw_if_stopped(stop);
-    const auto page = store.read_events(job_key, filter, std::min<std::uint64_t>(kPage, last - filter.after));
+    const auto page = store.read_events(job.job_key, filter, std::min<std::uint64_t>(kPage, last - filter.after));
     if (!page) return page.error();
-    if (page->empty()) return Error{ErrorCode::kInternal, "the stored history ends before its last event"};
+    if (page->empty()) return does_not_fold(job, filter.after + 1, "it is not there");
     for (const Event& event : *page) {
       throw_if_stopped(stop);
-      use(event);
+      try {
+        use(event);
+      } catch (const std::exception& error) {
+        return does_not_fold(job, event.seq, error.what());
+      }
     }
     filter.after = page->back().seq;
   }
   return Ok{};
-}
-
-Error stopped() { return {ErrorCode::kUnavailable, "the server is shutting down"}; }
-
-Error does_not_fold(const JobRow& job, const std::exception& error) {
-  return {ErrorCode::kInternal, "the stored history of job " + job.id + " does not fold: " + error.what()};
 }
 
 }  // namespace
@@ -92,12 +100,12 @@ Result<ColonyAt> Past::colony_after(const JobRow& job, std::uint64_t seq) {
   }
   if (spec == nullptr) {
     auto decoded = decode_(job.spec_json);
-    if (!decoded) return Error{ErrorCode::kInternal, "the stored spec cannot be used: " + decoded.error().message};
+    if (!decoded) return spec_is_unusable(job, decoded.error());
     spec = std::make_shared<const RunSpec>(std::move(*decoded));
   }
   try {
     auto colony = start != nullptr ? std::make_shared<Colony>(*start) : std::make_shared<Colony>(spec->params);
-    const Status folded = for_each_event(store_, &stop_, job.job_key, colony->last_seq(), seq,
+    const Status folded = for_each_event(store_, &stop_, job, colony->last_seq(), seq,
                                          [&](const Event& event) { colony->apply(event); });
     if (!folded) return folded.error();
     keep(job, colony, spec);
@@ -105,7 +113,7 @@ Result<ColonyAt> Past::colony_after(const JobRow& job, std::uint64_t seq) {
   } catch (const Stopped&) {
     return stopped();
   } catch (const std::exception& error) {
-    return does_not_fold(job, error);
+    return does_not_fold(job, start != nullptr ? start->last_seq() + 1 : 1, error.what());
   }
 }
 
@@ -134,7 +142,7 @@ Result<std::vector<SeriesRow>> Past::series(const JobRow& job, std::size_t point
     }
   }
   const auto spec = decode_(job.spec_json);
-  if (!spec) return Error{ErrorCode::kInternal, "the stored spec cannot be used: " + spec.error().message};
+  if (!spec) return spec_is_unusable(job, spec.error());
   const std::shared_ptr<Curve> curve = curve_of(job, *spec);
   auto rows = series_along(job, *curve, points);
   const std::lock_guard lock(mutex_);
@@ -165,14 +173,14 @@ std::shared_ptr<Past::Curve> Past::curve_of(const JobRow& job, const RunSpec& sp
 Result<std::vector<SeriesRow>> Past::series_along(const JobRow& job, Curve& curve, std::size_t points) {
   const std::lock_guard lock(curve.mutex);
   try {
-    const Status folded = for_each_event(store_, &stop_, job.job_key, curve.colony.last_seq(), job.last_seq,
+    const Status folded = for_each_event(store_, &stop_, job, curve.colony.last_seq(), job.last_seq,
                                          [&](const Event& event) { curve.follow(event); });
     curve.bytes = curve.colony.cells().size() * kCurveBytesACell + curve.steps.capacity() * sizeof(Curve::Step);
     if (!folded) return folded.error();
   } catch (const Stopped&) {
     return stopped();
   } catch (const std::exception& error) {
-    return does_not_fold(job, error);
+    return does_not_fold(job, curve.colony.last_seq() + 1, error.what());
   }
   const double end_h = job.time_h;
   const std::size_t count = end_h > 0.0 ? points : 1;

@@ -54,7 +54,7 @@ void check_head(const RequestHead& head) {
   require(head.headers.count("Host") == 1 && head.headers.count("Content-Length") <= 1);
   require(head.headers.count("Transfer-Encoding") == (head.chunked ? 1 : 0));
   require(!head.content_length || *head.content_length <= head.body_bytes_max);
-  require(!head.method.empty() && head.target.path.starts_with('/'));
+  require(!head.method.empty() && (head.target.path.starts_with('/') || (head.target.path == "*" && head.method == "OPTIONS")));
   require(head.version_minor == 0 || head.version_minor == 1);
   const auto is_control = [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; };
   require(std::none_of(head.target.path.begin(), head.target.path.end(), is_control));

@@ -50,6 +50,8 @@ function attacks({ reader, submitter, unknown, cut, foreign }) {
     ['a method override', get('/v1/jobs/x', [host, 'X-HTTP-Method-Override: DELETE']), [404]],
     ['HEAD where admin is needed', get('/v1/tokens', [host]).replace('GET', 'HEAD'), [403]],
     ['TRACE', get('/healthz', [host]).replace('GET', 'TRACE'), [501]],
+    ['OPTIONS of the server itself', `OPTIONS * HTTP/1.1\r\n${host}\r\n\r\n`, [204]],
+    ['another method of the server itself', `DELETE * HTTP/1.1\r\n${host}\r\n\r\n`, [400]],
     ['a method of 4 kB', get('/healthz', [host]).replace('GET', 'G'.repeat(4000)), [400, 414, 501]],
     ['a forged X-Forwarded-For', anyone.get('/v1/jobs', [host, 'X-Forwarded-For: 127.0.0.1', 'X-Real-IP: 127.0.0.1']), [401]],
     ['a rewritten URL', anyone.get('/healthz', [host, 'X-Original-URL: /v1/tokens', 'X-Rewrite-URL: /v1/tokens']), [200]],

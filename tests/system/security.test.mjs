@@ -1,8 +1,10 @@
 // security: who is let in, over what, and what is written down about it.
 import assert from 'node:assert/strict';
-import { spawnSync } from 'node:child_process';
+import { execFileSync, spawnSync } from 'node:child_process';
 import { once } from 'node:events';
+import { chmodSync, writeFileSync } from 'node:fs';
 import net from 'node:net';
+import { join } from 'node:path';
 import test from 'node:test';
 import tls from 'node:tls';
 import { finishedJob, small } from './harness/jobs.mjs';
@@ -72,12 +74,15 @@ test('tokens: scopes, revocation, actors, and a log without secrets', async (t) 
   await t.test('a revoked token is worth nothing at once, also for an open stream, and after a restart', async () => {
     const mal = await made(server, 'mal', 'read');
     const { json: job } = await server.post('/v1/jobs', { until: { cells: 100_000 }, model: { division: { generation_limit: null } } });
+    const shown = await server.get(`/v1/jobs/${job.id}`, bearer(mal.token));
+    const waits = server.get(`/v1/jobs/${job.id}`, { ...bearer(mal.token), Prefer: 'wait=60', 'If-None-Match': shown.headers.etag });
     const stream = await openStream(t, server, `/v1/jobs/${job.id}/events?kind=progress`, { headers: bearer(mal.token) });
     await stream.until('progress', ({ events }) => events.length > 0);
     assert.equal((await server.request('DELETE', `/v1/tokens/${mal.id}`)).status, 204);
     assert.equal((await server.get('/v1/jobs', bearer(mal.token))).status, 401);
     await stream.untilClosed();
     assert.equal(stream.events.at(-1).event, 'bye');
+    assert.ok([200, 401].includes((await waits).status), 'the state may have changed before');
     await server.post(`/v1/jobs/${job.id}/cancel`, {});
     await server.kill();
     const again = await startServer(t, { data, token: root, args: required });
@@ -114,6 +119,38 @@ test('a server refuses to be reached without tokens and TLS', (t) => {
   const missing = refusedStart(data, ['--listen', '127.0.0.1:0', '--tls.certificate', '/no/such', '--tls.key', '/no/such']);
   assert.equal(missing.status, 1);
   assert.match(missing.stderr, /tls\.certificate/);
+});
+
+test('a certificate and a key that are of no use are named, and a key that others can read', async (t) => {
+  const data = temporaryFolder(t);
+  const { certificate, key } = makeCertificate(temporaryFolder(t));
+  const other = makeCertificate(temporaryFolder(t));
+  const rsa = join(data, 'rsa.pem');
+  execFileSync('openssl', ['genrsa', '-out', rsa, '2048'], { stdio: 'ignore' });
+  const locked = join(data, 'locked.pem');
+  execFileSync('openssl', ['ec', '-in', key, '-out', locked, '-aes128', '-passout', 'pass:secret'], { stdio: 'ignore' });
+  const empty = join(data, 'empty.pem');
+  writeFileSync(empty, '');
+  for (const [wrong, setting, file, why] of [
+    [{ certificate, key: other.key }, 'tls.key', other.key, `tls.certificate '${certificate}'`],
+    [{ certificate, key: rsa }, 'tls.key', rsa, `tls.certificate '${certificate}'`],
+    [{ certificate, key: locked }, 'tls.key', locked, 'passphrase'],
+    [{ certificate, key: certificate }, 'tls.key', certificate, 'not a key'],
+    [{ certificate, key: '/no/such' }, 'tls.key', '/no/such', 'No such file'],
+    [{ certificate: data, key }, 'tls.certificate', data, 'directory'],
+    [{ certificate: empty, key }, 'tls.certificate', empty, 'empty'],
+    [{ certificate: key, key }, 'tls.certificate', key, 'not a certificate'],
+  ]) {
+    const { status, stderr } = refusedStart(data, ['--listen', '127.0.0.1:0', '--tls.certificate', wrong.certificate, '--tls.key', wrong.key]);
+    assert.equal(status, 1, stderr);
+    for (const part of [`${setting}: `, `'${file}'`, why]) assert.ok(stderr.includes(part), `${part} in ${stderr}`);
+  }
+  for (const [mode, warns] of [[0o600, false], [0o640, false], [0o644, true], [0o660, true]]) {
+    chmodSync(key, mode);
+    const server = await startServer(t, { args: ['--tls.certificate', certificate, '--tls.key', key] });
+    await server.stop();
+    assert.equal(server.err.includes(`tls.key: others than its owner can get at '${key}' (mode 0${mode.toString(8)})`), warns, server.err);
+  }
 });
 
 test('a token is made with the server stopped only', async (t) => {

@@ -94,6 +94,13 @@ TEST(Tokens, AreRandomHashedAndNeverShown) {
   EXPECT_EQ(without_tokens("GET /" + a + "/" + b + " x"), "GET /colony_[hidden]/colony_[hidden] x");
   EXPECT_EQ(without_tokens("cut " + a.substr(0, 40)), "cut colony_[hidden]");
   EXPECT_EQ(without_tokens("/colony_face colony_"), "/colony_face colony_");
+  const std::string digits = a.substr(7);
+  EXPECT_EQ(without_tokens("id " + digits + "-2"), "id [hidden]-2") << "without its prefix";
+  std::string upper = a;
+  std::transform(upper.begin(), upper.end(), upper.begin(), [](char c) { return c >= 'a' && c <= 'z' ? static_cast<char>(c - 32) : c; });
+  EXPECT_EQ(without_tokens(upper), "COLONY_[hidden]");
+  EXPECT_EQ(without_tokens(a + a), "colony_[hidden]olony_[hidden]");
+  EXPECT_EQ(without_tokens(digits.substr(0, 63)), digits.substr(0, 63)) << "ids and digests have fewer";
 }
 
 class AdmissionTest : public ::testing::Test {
@@ -145,6 +152,18 @@ TEST_F(AdmissionTest, ScopesIncludeThoseBefore) {
   EXPECT_EQ(status(admission, bearer(tokens.at(Scope::kRead)), Access::kAdmin), 403);
   EXPECT_EQ(last->code, "insufficient-scope");
   EXPECT_THAT(last->challenge, HasSubstr("error=\"insufficient_scope\", scope=\"admin\""));
+}
+
+TEST_F(AdmissionTest, TwoTokensAtOnceAreATryToo) {
+  Admission admission(config, table);
+  const std::string token = add("a", Scope::kAdmin);
+  Headers headers = bearer(token);
+  headers.add("Authorization", "Bearer " + token);
+  EXPECT_EQ(status(admission, headers, Access::kRead), 400);
+  EXPECT_EQ(status(admission, headers, Access::kRead), 400);
+  EXPECT_EQ(status(admission, headers, Access::kRead), 429);
+  EXPECT_EQ(status(admission, bearer(*new_token()), Access::kRead), 429) << "of one count with wrong ones";
+  EXPECT_EQ(status(admission, bearer(token), Access::kRead), 200);
 }
 
 TEST_F(AdmissionTest, WhatIsNoTokenIsRefusedWithAChallenge) {

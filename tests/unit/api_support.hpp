@@ -246,6 +246,7 @@ class ApiFixture {
   FakeJobs jobs;
   http::TokenTable tokens;
   http::Principal principal;
+  std::shared_ptr<std::atomic<bool>> gives_up;  // of every request; null: nobody says
 
   static api::ApiConfig config() {
     api::ApiConfig config;
@@ -271,6 +272,7 @@ class ApiFixture {
     request.body = std::move(body);
     request.request_id = "request-1";
     request.principal = principal;
+    request.gives_up = gives_up;
     return router_.dispatch(request);
   }
   http::Response get(const std::string& target, std::vector<std::pair<std::string, std::string>> headers = {}) {

@@ -110,18 +110,25 @@ TEST(Submit, OneAtATimeMayHaveManyFounders) {
   EXPECT_FALSE(context.places_many) << "given back";
 }
 
-TEST(Submit, IsGivenUpWhenTheServerEnds) {
-  ApiFixture fixture;
-  fixture.api().drain();
-  for (const char* target : {"/v1/jobs", "/v1/jobs?dry_run=true"}) {
-    auto response = fixture.post(target, founders(2000));
-    EXPECT_EQ(response.status, 503);
-    EXPECT_EQ(json_of(response)["type"], "urn:colony:problem:unavailable");
-    EXPECT_NE(header(response, "Retry-After"), "");
+// By the end of the server where nothing else is said, else by who waits for the answer.
+TEST(Submit, AndAllThatTakesLongIsGivenUpForNobody) {
+  ApiFixture drained, left;
+  drained.api().drain();
+  left.gives_up = std::make_shared<std::atomic<bool>>(true);
+  for (ApiFixture* const fixture : {&drained, &left}) {
+    const auto expect_given_up = [](const std::string& what, http::Response response) {
+      EXPECT_EQ(response.status, 503) << what;
+      EXPECT_EQ(json_of(response)["type"], "urn:colony:problem:unavailable") << what;
+      EXPECT_NE(header(response, "Retry-After"), "") << what;
+    };
+    for (const char* target : {"/v1/jobs", "/v1/jobs?dry_run=true"}) expect_given_up(target, fixture->post(target, founders(2000)));
+    EXPECT_TRUE(fixture->jobs.submitted.empty());
+    for (const char* path : {"/image", "/mesh", "/analysis", "/lineage"}) expect_given_up(path, fixture->get(kJob + path));
+    expect_given_up("ome-tiff", fixture->get(kJob + "/image", {{"Accept", "image/tiff"}}));
   }
-  EXPECT_TRUE(fixture.jobs.submitted.empty());
-  auto image = fixture.get(kJob + "/image");
-  EXPECT_EQ(image.status, 503) << "drawing, too";
+  *left.gives_up = false;
+  left.api().drain();
+  EXPECT_EQ(left.get(kJob + "/image?width_px=64").status, 200) << "the http server says when";
 }
 
 TEST(Paths, BeginWithTheBasePath) {

@@ -1,4 +1,4 @@
-// The parts of server/http that need no socket: target, scanner, router, problem, wire.
+// The parts of server/http that need no socket: target, scanner, problem, wire.
 #include <stdexcept>
 #include <string>
 
@@ -249,14 +249,6 @@ TEST(HttpBody, ExtensionsAreBoundedInSum) {
   EXPECT_LT(count, 30);
 }
 
-Response dispatch(const Router& router, std::string method, std::string path) {
-  Request request;
-  request.method = std::move(method);
-  request.path = std::move(path);
-  request.request_id = "id-1";
-  return router.dispatch(request);
-}
-
 // Beast reads such a line again with every piece; each reading must not cost a part of the bound.
 TEST(HttpBodyReader, AnOpenQuoteIsReadAlikeInPiecesAndAtOnce) {
   RequestHead head;
@@ -272,53 +264,6 @@ TEST(HttpBodyReader, AnOpenQuoteIsReadAlikeInPiecesAndAtOnce) {
     }
     EXPECT_EQ(state, BodyReader::State::kNeedMore) << step;
   }
-}
-
-TEST(HttpRouter, PatternBeforeMethodLiteralBeforeCapture) {
-  Router router;
-  const auto named = [](std::string name) {
-    return [name](const Request& request) {
-      Response response;
-      response.body = name;
-      for (const auto& param : request.path_params) response.body += ":" + param;
-      return response;
-    };
-  };
-  router.add("GET", "/v1/jobs/{}", named("job"));
-  router.add("DELETE", "/v1/jobs/{}", named("delete"));
-  router.add("GET", "/v1/jobs/counts", named("counts"));
-  router.add("GET", "/v1/{}/{}", named("any"));
-  router.add("GET", "/", named("root"));
-  EXPECT_EQ(dispatch(router, "GET", "/v1/jobs/counts").body, "counts");
-  EXPECT_EQ(dispatch(router, "GET", "/v1/jobs/a b").body, "job:a b");
-  EXPECT_EQ(dispatch(router, "HEAD", "/v1/jobs/a").body, "job:a");
-  EXPECT_EQ(dispatch(router, "GET", "/v1/x/y").body, "any:x:y");
-  EXPECT_EQ(dispatch(router, "GET", "/").body, "root");
-  const auto wrong_method = dispatch(router, "DELETE", "/v1/jobs/counts");
-  EXPECT_EQ(wrong_method.status, 405);
-  EXPECT_EQ(wrong_method.headers.get("allow"), "GET, HEAD, OPTIONS");
-  const auto options = dispatch(router, "OPTIONS", "/v1/jobs/a");
-  EXPECT_EQ(options.status, 204);
-  EXPECT_EQ(options.headers.get("Allow"), "GET, HEAD, DELETE, OPTIONS");
-  for (const char* path : {"/v1/jobs", "/v1/jobs/", "/v1/jobs/a/b", "//", "/v1//", "/V1/jobs/a"}) {
-    const auto missing = dispatch(router, "GET", path);
-    EXPECT_EQ(missing.status, 404) << path;
-    EXPECT_NE(missing.body.find(path), std::string::npos) << "the problem names the path";
-  }
-  EXPECT_ANY_THROW(router.add("GET", "/", named("twice")));
-}
-
-TEST(HttpRouter, AnExceptionIsToldToTheLogAndNotToTheClient) {
-  Router router;
-  router.add("GET", "/", [](const Request&) -> Response { throw std::runtime_error("secret detail"); });
-  std::string heard;
-  router.on_failure(
-      [&](const Request& request, std::string_view what) { heard = request.request_id + " " + std::string(what); });
-  const auto response = dispatch(router, "GET", "/");
-  EXPECT_EQ(response.status, 500);
-  EXPECT_EQ(response.body.find("secret"), std::string::npos);
-  EXPECT_NE(response.body.find("\"request_id\":\"id-1\""), std::string::npos);
-  EXPECT_EQ(heard, "id-1 secret detail");
 }
 
 TEST(HttpProblem, IsJsonWhateverItIsGiven) {

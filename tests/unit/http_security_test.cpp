@@ -1,4 +1,6 @@
 // Tokens, limits by address, sites that may ask, and the headers on every answer, over real sockets.
+#include <atomic>
+
 #include <gmock/gmock.h>
 
 #include "tests/unit/http_sources.hpp"
@@ -101,6 +103,42 @@ TEST(HttpSecurity, AStreamEndsWithItsToken) {
   ASSERT_TRUE(client.read_until("first;"));
   server.tokens.remove("a");
   EXPECT_TRUE(client.read_until("bye;")) << "at once, not at the next sign of life";
+}
+
+TEST(HttpSecurity, AnAnswerThatIsWaitedForEndsWithItsToken) {
+  struct Never : LaterAnswer {
+    explicit Never(std::atomic<int>& count) : asked(count) {}
+    void on_ready(std::function<void()>) override {}
+    std::unique_ptr<Response> ask(bool is_last) override {
+      ++asked;
+      asked.notify_all();
+      return is_last ? std::make_unique<Response>() : nullptr;
+    }
+    std::chrono::milliseconds wait_max() const override { return std::chrono::hours(1); }
+    std::atomic<int>& asked;
+  };
+  std::atomic<int> asked{0};
+  TestServer server(
+      [&asked](Router& router) {
+        router.add("GET", "/wait", [&asked](const Request&) {
+          Response response;
+          response.later = std::make_unique<Never>(asked);
+          return response;
+        });
+      },
+      with_tokens());
+  server.run();
+  const std::string removed = add_token(server, "a", Scope::kRead);
+  RawClient client(server.port());
+  client.send(get("/wait", bearer(removed)));
+  asked.wait(0);
+  server.tokens.remove("a");
+  const Reply reply = client.read_reply();
+  EXPECT_EQ(reply.status, 401) << "at once, not when the time is up";
+  EXPECT_THAT(reply.header("WWW-Authenticate"), HasSubstr("invalid_token"));
+  const std::string brief = *new_token();
+  server.tokens.add({"b", "name-b", Scope::kRead, hash_of_token(brief), unix_time_ms() + 100});
+  EXPECT_EQ(RawClient(server.port()).ask(get("/wait", bearer(brief))).status, 401) << "its time is the token's";
 }
 
 TEST(HttpSecurity, WhatWasFoundIsNotToldToATokenThatEndedMeanwhile) {

@@ -82,7 +82,8 @@ std::vector<Shape> refused_shapes() {
       {"absolute target with user", get("http://a@localhost/hello"), 400},
       {"absolute target of https", get("https://localhost/hello"), 400},
       {"authority target", "CONNECT localhost:80 HTTP/1.1\r\n" + kHost + "\r\n", 400},
-      {"asterisk target", "OPTIONS * HTTP/1.1\r\n" + kHost + "\r\n", 400},
+      {"asterisk target of GET", get("*"), 400},
+      {"asterisk and more", "OPTIONS *a HTTP/1.1\r\n" + kHost + "\r\n", 400},
       {"relative target", get("hello"), 400},
       {"fragment", get("/hello#a"), 400},
       {"target beyond ASCII", get("/h\xC3\xA4llo"), 400},
@@ -143,7 +144,7 @@ TEST(HttpShapes, EachRefusedShapeGetsAProblemAndTheConnectionEnds) {
     RawClient client(server.port());
     client.send(shape.bytes);
     client.end_sending();
-    const Reply reply = client.read_reply();
+    const Reply reply = client.read_last_reply();
     EXPECT_EQ(reply.status, shape.status) << reply.body;
     EXPECT_TRUE(reply.is_complete);
     EXPECT_EQ(reply.header("Content-Type"), "application/problem+json");
@@ -180,6 +181,7 @@ TEST(HttpShapes, UnusualButRightShapesAreAnswered) {
       {"nothing there", get("/nothing"), 404},
       {"two slashes", get("//hello"), 404},
       {"wrong method", "PUT /hello HTTP/1.1\r\n" + kHost + "\r\n", 405},
+      {"options of the server", "OPTIONS * HTTP/1.1\r\n" + kHost + "\r\n", 204},
       {"options", "OPTIONS /hello HTTP/1.1\r\n" + kHost + "\r\n", 204},
   };
   for (const auto& shape : shapes) {
@@ -187,7 +189,7 @@ TEST(HttpShapes, UnusualButRightShapesAreAnswered) {
     RawClient client(server.port());
     client.send(shape.bytes);
     client.end_sending();
-    const Reply reply = client.read_reply();
+    const Reply reply = client.read_last_reply();
     EXPECT_EQ(reply.status, shape.status) << reply.body;
     EXPECT_TRUE(reply.is_complete);
     EXPECT_EQ(reply.header("X-Content-Type-Options"), "nosniff");

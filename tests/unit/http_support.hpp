@@ -83,6 +83,12 @@ class RawClient {
     fd_ = -1;
   }
   void end_sending() { ::shutdown(fd_, SHUT_WR); }
+  /// Goes without a goodbye: the server sees a reset.
+  void reset() {
+    const linger at_once{1, 0};
+    setsockopt(fd_, SOL_SOCKET, SO_LINGER, &at_once, sizeof at_once);
+    close();
+  }
 
   /// False: the server does not take it any more.
   bool send(std::string_view bytes) {
@@ -149,6 +155,13 @@ class RawClient {
       reply.body = read_to_end();
       reply.is_complete = true;
     }
+    return reply;
+  }
+
+  /// The next that is none of those which only say that it will come.
+  Reply read_last_reply() {
+    Reply reply = read_reply();
+    while (reply.status == 100) reply = read_reply();
     return reply;
   }
 

@@ -57,5 +57,21 @@ TEST(Log, ATokenInAnUnlikelyPlaceIsHidden) {
   }
 }
 
+TEST(Log, WhatAClientChoseIsSearchedForSecrets) {
+  const std::string secret = http::new_token()->substr(7);  // the bare digits
+  http::AccessRecord access = record();
+  http::Request request;
+  request.method = "GET";
+  request.path = "/v1/jobs";
+  for (std::string* const field : {&access.method, &access.path, &access.request_id, &access.actor}) *field += secret;
+  for (std::string* const field : {&request.method, &request.path, &request.request_id, &request.principal.name}) *field += secret;
+  for (const LogFormat format : {LogFormat::kText, LogFormat::kJson}) {
+    for (const LogLine& line : {log_access(format, "", access), log_failure(format, "", request, "threw")}) {
+      EXPECT_THAT(line.text, Not(HasSubstr(secret.substr(0, 12))));
+      EXPECT_THAT(line.text, HasSubstr("GET[hidden]"));
+    }
+  }
+}
+
 }  // namespace
 }  // namespace colony::server

@@ -64,6 +64,26 @@ TEST(Meta, ProblemTableIsWhole) {
   EXPECT_EQ(api::problem_row(api::problem_kind_of(ErrorCode::kNotReached)).code, "time-not-reached");
 }
 
+TEST(Meta, HealthNeedsNoWorker) {
+  ApiFixture fixture;
+  http::Router router;
+  fixture.api().add_routes(router);
+  http::Request request;
+  request.method = "GET";
+  request.path = "/healthz";
+  const auto ready = router.dispatch_ready(request);
+  ASSERT_TRUE(ready);
+  EXPECT_EQ(ready->body, fixture.get("/healthz").body);
+  request.query.emplace_back("x", "1");
+  EXPECT_EQ(router.dispatch_ready(request)->status, 422) << "held to what every request is";
+}
+
+TEST(Meta, AProblemOf500SaysWhyToTheLogAlone) {
+  const Error error{ErrorCode::kInternal, "event 7 of job j is not there"};
+  EXPECT_EQ(api::problem_response(error, "id").failure, error.message);
+  EXPECT_EQ(api::problem_response({ErrorCode::kStorage, "the disk is full"}, "id").failure, "") << "an operator's matter, and no bug";
+}
+
 TEST(Meta, HealthAndReadiness) {
   ApiFixture fixture;
   EXPECT_EQ(fixture.get("/healthz").body, R"({"status":"ok"})");

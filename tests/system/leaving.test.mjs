@@ -1,0 +1,74 @@
+// leaving: clients that go away before their answer, and stored data that is damaged: what the others notice, and what the log says.
+import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
+import net from 'node:net';
+import { join } from 'node:path';
+import test from 'node:test';
+import { send } from './harness/http.mjs';
+import { finishedJob, small } from './harness/jobs.mjs';
+import { startServer, temporaryFolder } from './harness/server.mjs';
+import { eventually, within } from './harness/wait.mjs';
+
+const logged = (server) => server.err.split('\n').slice(0, -1).map((line) => JSON.parse(line));
+const requests = (server, path) => logged(server).filter((line) => line.event === 'request' && line.path.endsWith(path));
+
+/** Asks on a connection of its own, and says what status came (undefined: none yet). */
+function asked(port, path) {
+  const state = { socket: net.connect(port, '127.0.0.1') };
+  state.socket.on('connect', () => state.socket.write(`GET ${path} HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n`));
+  state.socket.on('data', (bytes) => { state.status ??= Number(/^HTTP\/1\.1 (\d{3})/.exec(bytes.toString('latin1'))?.[1]); });
+  state.socket.on('error', () => {});
+  return state;
+}
+
+test('pictures for clients who left', async (t) => {
+  const server = await startServer(t, { args: ['--log.format', 'json'] });
+  const job = await finishedJob(server, small(7, 60));
+  // More than are drawn at a time (2) and wait (32). Each would take seconds.
+  const clients = Array.from({ length: 40 }, () => asked(server.port, `/v1/jobs/${job.id}/image?width_px=8192`));
+  await eventually('those beyond the queue to be refused', () => clients.filter(({ status }) => status === 503).length >= 6);
+  const health = [];
+  const ask = async () => health.push((await server.get('/healthz')).status);
+  await ask();
+  for (const { socket } of clients) socket.destroy();
+  await eventually('all to be given up', async () => {
+    await ask();
+    return requests(server, '/image').length === clients.length;
+  });
+  assert.ok(health.every((status) => status === 200));
+  const later = await server.get(`/v1/jobs/${job.id}/image?width_px=64`);
+  assert.equal(later.status, 200);
+  await eventually('its line', () => requests(server, '/image').length === clients.length + 1);
+  const statuses = requests(server, '/image').map(({ status }) => status);
+  assert.ok(statuses.filter((status) => status === 499).length >= 32, `${statuses}`);
+  assert.equal(statuses.indexOf(200), clients.length, 'not one was drawn that nobody waited for');
+});
+
+test('a client that only stops sending gets its picture', async (t) => {
+  const server = await startServer(t);
+  const job = await finishedJob(server, small());
+  const socket = net.connect({ port: server.port, host: '127.0.0.1', allowHalfOpen: true });
+  let answer = '';
+  socket.on('data', (bytes) => { answer += bytes.toString('latin1'); });
+  socket.end(`GET /v1/jobs/${job.id}/image?width_px=3000 HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n`);
+  await within(60_000, new Promise((done) => socket.on('end', done)), 'the picture');
+  const [head, body] = answer.replace(/^HTTP\/1\.1 100 Continue\r\n\r\n/, '').split('\r\n\r\n');
+  assert.match(head, /^HTTP\/1\.1 200 OK\r\n/);
+  assert.equal(body.slice(1, 4), 'PNG');
+});
+
+test('damaged data is a 500 whose reason stands in the log', async (t) => {
+  const data = temporaryFolder(t);
+  const before = await startServer(t, { data });
+  const job = await finishedJob(before, small());
+  await before.stop();
+  execFileSync('sqlite3', ['-batch', join(data, 'colony.db'), `delete from event where seq = ${job.last_seq}`]);
+  const server = await startServer(t, { data, args: ['--log.format', 'json'] });
+  for (const path of ['cells', 'series']) {
+    const response = await send(server.port, 'GET', `/v1/jobs/${job.id}/${path}`, { headers: { 'X-Request-Id': `ask-${path}` } });
+    assert.equal(response.status, 500);
+    const failure = await eventually('its line', () => logged(server).find(({ event, request_id }) => event === 'failure' && request_id === `ask-${path}`));
+    assert.equal(failure.level, 'error');
+    assert.match(failure.message, new RegExp(`job ${job.id} does not fold at event ${job.last_seq}\\b`));
+  }
+});
