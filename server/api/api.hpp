@@ -64,6 +64,7 @@ inline constexpr std::uint64_t kFoundersPlacedFreely = 1000;
 
 class Feeds;
 class JobTexts;
+class Pages;
 
 /// What handlers work with.
 struct Context {
@@ -78,6 +79,7 @@ struct Context {
   // Not shared: a unique_ptr would have to know the class here.
   std::shared_ptr<JobTexts> job_texts = {};  // answers of GET, kept
   std::shared_ptr<Feeds> feeds = {};         // of the streams, which all end before it
+  std::shared_ptr<Pages> pages = {};         // of the streams of pages, likewise
   std::atomic<std::size_t> waiting{0};  // requests that wait for a job to change
   std::string docs_text = {};           // the page of /docs, made once
   std::mutex tokens_mutex = {};  // a change of the stored tokens and of `tokens` is one
