@@ -73,8 +73,8 @@ test('with tokens', async (t) => {
 
   await t.test('it says what asking again cannot mend, and ends when it is told to', async () => {
     const { id } = await submit(server, endless(3));
-    await assert.rejects(readStream(`${server.url}/v1/jobs/${id}/events`, 'colony_wrong', assert.fail), /^Error: 401: .*unauthorized|^Error: 401/);
-    await assert.rejects(readStream(`${server.url}/v1/jobs/01890000-0000-7000-8000-000000000000/events`, token, assert.fail), /^Error: 404/);
+    await assert.rejects(readStream(`${server.url}/v1/jobs/${id}/events`, 'colony_wrong', assert.fail), /^Error: 401: /);
+    await assert.rejects(readStream(`${server.url}/v1/jobs/01890000-0000-7000-8000-000000000000/events`, token, assert.fail), /^Error: 404: /);
     const abort = new AbortController();
     await readStream(`${server.url}/v1/stream`, token, ({ event }) => { if (event === 'ready') abort.abort(); }, abort.signal);
     assert.equal((await command(server, id, 'cancel')).status, 202);

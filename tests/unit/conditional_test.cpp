@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/api/analyse.hpp"
 #include "tests/unit/api_support.hpp"
 
 namespace colony::server::testing {
@@ -257,7 +258,7 @@ TEST(Preconditions, OfOtherThingsAreHeldAgainstTheirGet) {
   // An analysis: its tag is that of its bytes.
   AnalysisStore& analyses = fixture.jobs.store().analyses();
   NewAnalysis wanted;
-  wanted.options_json = "{}";
+  wanted.options_json = api::to_text(api::encode_image_options({}));
   wanted.media_type = "image/png";
   wanted.image = "not looked at";
   const auto made = analyses.create(wanted, {1'000'000, 10});
