@@ -88,8 +88,8 @@ Api::Api(JobService& jobs, http::TokenTable& tokens, ApiConfig config) {
   const SpecLimits limits{config.jobs.cells_max};
   context_ = std::unique_ptr<Context>(new Context{jobs, tokens, std::move(config), false, {}, {}});
   context_->job_texts = std::make_shared<JobTexts>(jobs, context_->config.base_path);
-  context_->feeds = std::make_shared<Feeds>(jobs);
   context_->pages = std::make_shared<Pages>(jobs, context_->config.base_path);
+  context_->feeds = std::make_shared<Feeds>(jobs);
   context_->schema_text = to_text(job_spec_schema(limits));
   const Json openapi = openapi_document(endpoints(), limits, context_->config.version, context_->config.base_path);
   context_->openapi_text = to_text(openapi);

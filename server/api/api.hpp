@@ -65,9 +65,9 @@ inline constexpr std::uint32_t kPackingPoints = 1024;               // a cell's 
 /// Placing more founders than this can take long: one submission at a time may.
 inline constexpr std::uint64_t kFoundersPlacedFreely = 1000;
 
+class Pages;
 class Feeds;
 class JobTexts;
-class Pages;
 
 /// What handlers work with.
 struct Context {
