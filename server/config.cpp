@@ -181,7 +181,7 @@ Result<Invocation> configure(const std::vector<std::string>& arguments, const En
       token_app->add_subcommand("create", "make a token and print its secret, this once")->fallthrough();
   create_app->add_option("--name", token.name, "of whom it stands for")->required();
   create_app->add_option("--scope", token.scope, "read, submit or admin")->required();
-  create_app->add_option("--expires-h", expires_h, "hours from now, at most 87600")->required();
+  create_app->add_option("--expires-h", expires_h, "hours from now, 0.001 to 87600")->required();
   try {
     app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
   } catch (const CLI::CallForHelp&) {

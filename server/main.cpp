@@ -145,7 +145,10 @@ int serve(const Config& config, const sigset_t& signals) {
 
   api::ApiConfig api_config;
   api_config.version = COLONY_VERSION;
-  api_config.jobs = config.jobs;
+  api_config.tokens_required = config.http.tokens_required;
+  api_config.is_encrypted = !config.http.tls_certificate.empty();
+  api_config.is_behind_proxy = config.http.behind_proxy;
+  api_config.jobs = jobs_config;
   api_config.body_bytes_max = config.http.body_bytes_max;
   api_config.header_bytes_max = config.http.header_bytes_max;
   api_config.connections_max = config.http.connections_max;

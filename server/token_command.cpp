@@ -34,6 +34,7 @@ int run_token_create(const Config& config, const TokenRequest& request) {
   if (!created) return fail(created.error().code == ErrorCode::kInvalid ? 2 : 1, "no token was made", created.error());
   std::printf("%s\n", created->secret.c_str());
   if (std::fflush(stdout) != 0) return 1;
+  for (const TokenRow& old : created->removed) std::fprintf(stderr, "%s\n", api::removed_text(old).c_str());
   std::fprintf(stderr, "token %s for %s, scope %s, valid until %s; it is shown this once\n", created->row.id.c_str(),
                created->row.name.c_str(), created->row.scope.c_str(), created->row.expires_at.c_str());
   return 0;

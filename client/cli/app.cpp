@@ -69,6 +69,7 @@ int run(const std::vector<std::string>& arguments, Environment& env) {
   add_analysis_commands(app, session, action);
   add_report_command(app, session, action);
   add_founders_command(app, session, action);
+  add_token_commands(app, session, action);
 
   ExitCode code = ExitCode::kDone;
   try {

@@ -25,6 +25,7 @@ void add_picture_commands(CLI::App& app, Session& session, Action& action);  // 
 void add_measure_commands(CLI::App& app, Session& session, Action& action);  // lineage mesh measure analyze compare
 void add_analysis_commands(CLI::App& app, Session& session, Action& action);  // analyses comparisons, one of them, deletion
 void add_report_command(CLI::App& app, Session& session, Action& action);
+void add_token_commands(CLI::App& app, Session& session, Action& action);  // tokens list, create, delete
 void add_founders_command(CLI::App& app, Session& session, Action& action);
 
 /// POSTs what makes a job, with an idempotency key (a random one if none is given), patiently; prints the job after `verb`. Its id.

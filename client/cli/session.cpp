@@ -92,8 +92,9 @@ std::string resolve_id(Session& session, const std::string& text, const Collecti
   std::vector<std::string> matches;
   std::optional<std::string> cursor;
   for (int page = 0; page < kPagesMax; ++page) {
-    const Json body = get_json(
-        session.client(), Target(in.path).add("limit", std::to_string(kPageLimit)).add_if("cursor", cursor).text());
+    Target target(in.path);
+    if (in.has_pages) target.add("limit", std::to_string(kPageLimit)).add_if("cursor", cursor);
+    const Json body = get_json(session.client(), target.text());
     const auto items = body.is_object() ? body.find("items") : body.end();
     if (items == body.end() || !items->is_array())
       throw Failure(ExitCode::kRefused, std::string("the server's list at ") + in.path + " has no items");

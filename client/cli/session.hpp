@@ -35,10 +35,12 @@ struct Collection {
   const char* path;     // of its list
   const char* one;      // "job"
   const char* command;  // that lists it
+  bool has_pages = true;
 };
 inline constexpr Collection kJobs{"/v1/jobs", "job", "list"};
 inline constexpr Collection kAnalyses{"/v1/analyses", "analysis", "analyses"};
 inline constexpr Collection kComparisons{"/v1/comparisons", "comparison", "comparisons"};
+inline constexpr Collection kTokens{"/v1/tokens", "token", "tokens list", false};
 
 /// The full id for a full id (not looked up) or for the unique end of one, found in the server's list.
 /// Errors: kUsage for what cannot be an id or is ambiguous (the candidates are named), kRefused when none ends so.

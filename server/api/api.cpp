@@ -7,6 +7,7 @@
 #include "server/api/feed.hpp"
 #include "server/api/job_texts.hpp"
 #include "server/api/openapi.hpp"
+#include "server/api/pages.hpp"
 #include "server/api/schema.hpp"
 
 namespace colony::server::api {
@@ -55,6 +56,7 @@ http::Response run_endpoint(const Endpoint& endpoint, Context& context, const ht
   if (!if_none_match) return problem_response(if_none_match.error(), request.request_id);
   try {
     const Call call{request, std::move(*query), media, std::move(*if_match), std::move(*if_none_match)};
+    if (auto refused = refused_before(endpoint, context, call)) return std::move(*refused);
     http::Response response = endpoint.handler(context, call);
     if (!response.later) apply_conditions(endpoint, call, response);
     return response;
@@ -85,11 +87,12 @@ Api::Api(JobService& jobs, http::TokenTable& tokens, ApiConfig config) {
   const SpecLimits limits{config.jobs.cells_max};
   context_ = std::unique_ptr<Context>(new Context{jobs, tokens, std::move(config), false, {}, {}});
   context_->job_texts = std::make_shared<JobTexts>(jobs, context_->config.base_path);
+  context_->pages = std::make_shared<Pages>(jobs, context_->config.base_path);
   context_->feeds = std::make_shared<Feeds>(jobs);
   context_->schema_text = to_text(job_spec_schema(limits));
   const Json openapi = openapi_document(endpoints(), limits, context_->config.version, context_->config.base_path);
   context_->openapi_text = to_text(openapi);
-  context_->docs_text = docs_page(openapi, context_->config.base_path);
+  context_->docs_text = docs_page(openapi, context_->config.base_path, context_->config.tokens_required);
 }
 
 Api::~Api() { drain(); }

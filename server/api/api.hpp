@@ -30,6 +30,9 @@ namespace colony::server::api {
 struct ApiConfig {
   std::string version;    // of the program
   std::string base_path;  // what paths in answers begin with; empty or "/colony"
+  bool tokens_required = false;  // what /docs tells its readers to send,
+  bool is_encrypted = false;     // and the address that it shows
+  bool is_behind_proxy = false;
   JobsConfig jobs;
   std::size_t body_bytes_max = 1024 * 1024;
   std::size_t header_bytes_max = 8 * 1024;
@@ -63,6 +66,7 @@ inline constexpr std::uint32_t kPackingPoints = 1024;               // a cell's 
 /// Placing more founders than this can take long: one submission at a time may.
 inline constexpr std::uint64_t kFoundersPlacedFreely = 1000;
 
+class Pages;
 class Feeds;
 class JobTexts;
 
@@ -79,6 +83,7 @@ struct Context {
   // Not shared: a unique_ptr would have to know the class here.
   std::shared_ptr<JobTexts> job_texts = {};  // answers of GET, kept
   std::shared_ptr<Feeds> feeds = {};         // of the streams, which all end before it
+  std::shared_ptr<Pages> pages = {};         // of the streams of pages, likewise
   std::atomic<std::size_t> waiting{0};  // requests that wait for a job to change
   std::string docs_text = {};           // the page of /docs, made once
   std::mutex tokens_mutex = {};  // a change of the stored tokens and of `tokens` is one
@@ -167,8 +172,9 @@ std::string history_tag(const Context& context, const Call& call, const ColonyAt
 /// A job as the answer, with its tag.
 http::Response job_response(const Context& context, int status, const JobView& view);
 http::Response failure(const Error& error, const Call& call);
-/// 412 if the request names revisions of this job by If-Match and it has none of them; also the job's own failure.
-std::optional<http::Response> refused_by_if_match(Context& context, const Call& call);
+/// 412 if the request names revisions of the path's job by If-Match and it has none of them, or has one that If-None-Match names; also
+/// the job's own failure.
+std::optional<http::Response> refused_by_preconditions(Context& context, const Call& call);
 http::Response no_such_revision(const Call& call, const JobRow& job);
 
 // One function per endpoint.

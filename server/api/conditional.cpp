@@ -93,6 +93,14 @@ http::Response not_modified(const http::Response& full) {
   return response;
 }
 
+/// The GET of an endpoint's own path, if its answers have a tag.
+const Endpoint* tagged_get(const Endpoint& endpoint) {
+  for (const Endpoint& one : endpoints()) {
+    if (one.method == "GET" && one.path == endpoint.path && one.validator != Validator::kNone) return &one;
+  }
+  return nullptr;
+}
+
 }  // namespace
 
 Result<std::optional<TagList>> read_tags(const http::Headers& headers, std::string_view name) {
@@ -199,6 +207,46 @@ std::string history_tag(const Context& context, const Call& call, const ColonyAt
 void stamp(http::Response& response, const std::string& tag) {
   response.headers.set("ETag", tag);
   response.headers.set("Cache-Control", kRevalidate);
+}
+
+Compared compared_by(const Endpoint& endpoint) {
+  if (endpoint.path.starts_with("/v1/jobs/{job_id}")) return Compared::kJob;
+  return tagged_get(endpoint) != nullptr ? Compared::kGet : Compared::kNothing;
+}
+
+std::optional<http::Response> refused_before(const Endpoint& endpoint, Context& context, const Call& call) {
+  if ((!call.if_match && !call.if_none_match) || is_safe(call.request)) return std::nullopt;
+  const Compared by = compared_by(endpoint);
+  if (by == Compared::kJob) return std::nullopt;
+  if (by == Compared::kNothing) {
+    std::vector<FieldError> fields;
+    for (const char* name : {"If-Match", "If-None-Match"}) {
+      if (call.request.headers.count(name) > 0) fields.push_back({name, "cannot be held: nothing here has a tag"});
+    }
+    return failure({ErrorCode::kMalformed, "this request takes no preconditions; nothing was done", std::move(fields)}, call);
+  }
+  http::Request get;
+  get.method = "GET";
+  get.path = call.request.path;
+  get.path_params = call.request.path_params;
+  get.principal = call.request.principal;
+  get.request_id = call.request.request_id;
+  http::Response is = run_endpoint(*tagged_get(endpoint), context, get);
+  if (is.status == 404) return std::nullopt;  // the handler says what there is not
+  if (is.status != 200) return is;
+  const std::string tag(is.headers.get("ETag").value_or(""));
+  if (call.if_match && !matches_strongly(*call.if_match, tag)) {
+    return problem_response(ProblemKind::kPreconditionFailed,
+                            {ErrorCode::kConflict, "what is there has another tag; nothing was done", {{"If-Match", "is not " + tag}}},
+                            call.request.request_id);
+  }
+  if (call.if_none_match && matches_weakly(*call.if_none_match, tag)) {
+    return problem_response(ProblemKind::kPreconditionFailed,
+                            {ErrorCode::kConflict, "what is there is what must not be; nothing was done",
+                             {{"If-None-Match", "fits " + tag}}},
+                            call.request.request_id);
+  }
+  return std::nullopt;
 }
 
 void apply_conditions(const Endpoint& endpoint, const Call& call, http::Response& response) {

@@ -60,6 +60,17 @@ std::optional<http::Response> settled_by_tag(const Call& call, const std::string
 /// ETag, and that a cache must ask before it gives the answer again.
 void stamp(http::Response& response, const std::string& tag);
 
+/// What If-Match and If-None-Match of a request that changes something are held against.
+enum class Compared {
+  kNothing,  // the target has no tag: such a request is refused (400), not passed over
+  kJob,      // the job of the path, by its revision; the handler looks (refused_by_preconditions)
+  kGet       // what GET of the same path answers
+};
+/// Of POST, PATCH and DELETE.
+Compared compared_by(const Endpoint& endpoint);
+/// 400 or 412 of such a request, before its handler; nullopt: run it. Of kJob always: its handler knows when to look.
+std::optional<http::Response> refused_before(const Endpoint& endpoint, Context& context, const Call& call);
+
 /// What is left to do after a handler: the tag of the body where the endpoint has one, If-Match and If-None-Match of GET and HEAD, Vary.
 void apply_conditions(const Endpoint& endpoint, const Call& call, http::Response& response);
 

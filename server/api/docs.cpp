@@ -8,20 +8,7 @@ namespace {
 
 constexpr int kDepthMax = 12;  // of a schema inside others; deeper parts are named only
 
-std::string escaped(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&': out += "&amp;"; break;
-      case '<': out += "&lt;"; break;
-      case '>': out += "&gt;"; break;
-      case '"': out += "&quot;"; break;
-      case '\'': out += "&#39;"; break;
-      default: out += c;
-    }
-  }
-  return out;
-}
+std::string escaped(std::string_view text) { return docs_escaped(text); }
 
 /// A text for people: escaped, and what stands in backticks as code.
 std::string prose(std::string_view text) {
@@ -59,7 +46,8 @@ std::string code(std::string_view text) { return "<code>" + escaped(text) + "</c
 
 class Page {
  public:
-  Page(const Json& openapi, std::string_view base_path) : openapi_(openapi), base_path_(base_path) {}
+  Page(const Json& openapi, std::string_view base_path, bool tokens_required)
+      : openapi_(openapi), base_path_(base_path), tokens_required_(tokens_required) {}
 
   std::string text() {
     const Json& info = openapi_["info"];
@@ -72,7 +60,7 @@ class Page {
            escaped(base_path_) + "/v1/schema/job\">the schema of a job</a>, <a href=\"" + escaped(base_path_) +
            "/v1/service-info\">limits and presets</a>.</p>\n</header>\n";
     contents();
-    out_ += "<main>\n";
+    out_ += "<main>\n" + docs_guide(tokens_required_);
     for (const Json& tag : openapi_["tags"]) group(tag);
     schemas();
     out_ += "</main>\n</body>\n</html>\n";
@@ -90,7 +78,8 @@ class Page {
   }
 
   void contents() {
-    out_ += "<nav aria-label=\"Contents\">\n";
+    out_ += "<nav aria-label=\"Contents\">\n<h2><a href=\"#before\">Before the examples</a></h2>\n<h2><a href=\"#reading-streams\">Reading a "
+            "stream</a></h2>\n";
     for (const Json& tag : openapi_["tags"]) {
       const std::string name = text_of(tag, "name");
       out_ += "<h2><a href=\"#" + escaped(name) + "\">" + escaped(name) + "</a></h2>\n<ul>\n";
@@ -116,6 +105,7 @@ class Page {
   void operation(const std::string& path, const std::string& method, const Json& operation) {
     out_ += "<article id=\"" + escaped(text_of(operation, "operationId")) + "\">\n<h3><b>" + method + "</b> " + escaped(path) +
             "</h3>\n<p>" + prose(text_of(operation, "summary")) + "</p>\n";
+    if (const std::string more = text_of(operation, "description"); !more.empty()) out_ += "<p>" + prose(more) + "</p>\n";
     parameters(operation["parameters"]);
     if (const auto body = operation.find("requestBody"); body != operation.end()) {
       out_ += "<h4>Body</h4>\n<ul>\n";
@@ -169,15 +159,14 @@ class Page {
   }
 
   std::string example(const std::string& path, const std::string& method, const Json& operation) const {
-    const Json& servers = openapi_["servers"];
-    std::string url = text_of(servers[0], "url");
-    if (url == "/") url.clear();
-    url = "http://127.0.0.1:8080" + url;
+    std::string url = "$BASE";  // docs_guide
     for (const char c : path) {
       if (c != '{' && c != '}') url += c;
     }
     std::string line = "curl";
     if (method != "GET") line += " -X " + method;
+    const bool needs_token = tokens_required_ && !member(operation, "security").empty();
+    if (needs_token) line += " -H \"Authorization: Bearer $TOKEN\"";
     if (const auto body = operation.find("requestBody"); body != operation.end()) {
       const auto first = member(*body, "content").begin();
       const std::string& media = first.key();
@@ -199,7 +188,7 @@ class Page {
       const bool is_file = form.find("image/") == 0 || form.find("model/") == 0;
       if (is_file) line += " -o FILE";
     }
-    return line + " '" + url + "'";
+    return line + " \"" + url + "\"";
   }
 
   Json example_of(const Json& schema) const {
@@ -294,11 +283,29 @@ class Page {
 
   const Json& openapi_;
   const std::string base_path_;
+  const bool tokens_required_;
   std::string out_;
 };
 
 }  // namespace
 
-std::string docs_page(const Json& openapi, std::string_view base_path) { return Page(openapi, base_path).text(); }
+std::string docs_escaped(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    switch (c) {
+      case '&': out += "&amp;"; break;
+      case '<': out += "&lt;"; break;
+      case '>': out += "&gt;"; break;
+      case '"': out += "&quot;"; break;
+      case '\'': out += "&#39;"; break;
+      default: out += c;
+    }
+  }
+  return out;
+}
+
+std::string docs_page(const Json& openapi, std::string_view base_path, bool tokens_required) {
+  return Page(openapi, base_path, tokens_required).text();
+}
 
 }  // namespace colony::server::api

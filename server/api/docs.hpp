@@ -10,7 +10,17 @@
 
 namespace colony::server::api {
 
-std::string docs_page(const Json& openapi, std::string_view base_path);
+/// Stands in the page for the address that it is asked at.
+inline constexpr std::string_view kDocsAddress = "{server-address}";
+
+/// `tokens_required`: the examples then send one where the operation needs it.
+std::string docs_page(const Json& openapi, std::string_view base_path, bool tokens_required);
+/// The page for whoever asks at this address ("https://lab.example/colony").
+std::string docs_at(std::string_view page, std::string_view address);
+
+/// The sections before the operations.
+std::string docs_guide(bool tokens_required);
+std::string docs_escaped(std::string_view text);
 
 /// /docs.css
 std::string_view docs_style();

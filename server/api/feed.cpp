@@ -132,6 +132,8 @@ void Feed::refresh(JobService& jobs) {
   if (is_read && !has_begun_) read_through_ = view->job.last_seq;  // who comes earlier reads the store
   if (is_read && has_begun_ && wish_.events) is_read = read_events(jobs, view->job.last_seq, pieces);
   if (is_read && !wish_.events) read_through_ = view->job.last_seq;
+  // A reading that failed half way gives nothing: the next begins where this one did, and would give the same events again.
+  if (!is_read) pieces.clear();
   std::shared_ptr<const WatchedJob> job;
   if (is_read) {
     job = std::make_shared<const WatchedJob>(

@@ -73,12 +73,19 @@ http::Response no_such_revision(const Call& call, const JobRow& job) {
       call.request.request_id);
 }
 
-std::optional<http::Response> refused_by_if_match(Context& context, const Call& call) {
-  if (!call.if_match || call.if_match->is_any) return std::nullopt;
+std::optional<http::Response> refused_by_preconditions(Context& context, const Call& call) {
+  const bool must_match = call.if_match && !call.if_match->is_any;
+  if (!must_match && !call.if_none_match) return std::nullopt;
   const auto view = context.jobs.show(call.id());
   if (!view) return failure(view.error(), call);
-  if (names_revision(*call.if_match, view->job, false)) return std::nullopt;
-  return no_such_revision(call, view->job);
+  if (must_match && !names_revision(*call.if_match, view->job, false)) return no_such_revision(call, view->job);
+  if (!call.if_none_match) return std::nullopt;
+  if (!call.if_none_match->is_any && !names_revision(*call.if_none_match, view->job, true)) return std::nullopt;
+  const std::string revision = std::to_string(view->job.revision);
+  return problem_response(ProblemKind::kPreconditionFailed,
+                          {ErrorCode::kConflict, "the job is at revision " + revision + "; nothing was changed",
+                           {{"If-None-Match", "names revision " + revision + ", or any"}}},
+                          call.request.request_id);
 }
 
 http::Response get_job(Context& context, const Call& call) {
@@ -111,7 +118,10 @@ http::Response patch_job(Context& context, const Call& call) {
   if (!body) return failure(body.error(), call);
   const auto change = decode_job_patch(*body);
   if (!change) return failure(change.error(), call);
-  std::optional<std::vector<std::uint64_t>> revisions;
+  if (call.if_none_match) {
+    if (auto refused = refused_by_preconditions(context, call)) return std::move(*refused);
+  }
+  std::optional<std::vector<std::uint64_t>> revisions;  // of If-Match: compared when it is written
   if (call.if_match && !call.if_match->is_any) revisions = revisions_of(*call.if_match, false);
   const auto edited = context.jobs.edit(call.id(), *change, revisions, call.request.principal.name);
   if (!edited) return failure(edited.error(), call);

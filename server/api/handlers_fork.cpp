@@ -35,7 +35,7 @@ http::Response fork_job(Context& context, const Call& call) {
   const auto before = context.jobs.submitted_before(keyed);
   if (!before) return failure(before.error(), call);
   if (*before) return submitted_response(context, **before, false);
-
+  if (auto refused = refused_by_preconditions(context, call)) return std::move(*refused);
   const auto target = context.jobs.show(call.id());
   if (!target) return failure(target.error(), call);
   if (target->job.kind != kColonyKind) return invalid(call, "only a colony can be forked; this job is of kind " + target->job.kind);
@@ -68,7 +68,7 @@ http::Response verify_job(Context& context, const Call& call) {
   const auto before = context.jobs.submitted_before(keyed);
   if (!before) return failure(before.error(), call);
   if (*before) return submitted_response(context, **before, false);
-
+  if (auto refused = refused_by_preconditions(context, call)) return std::move(*refused);
   const auto target = context.jobs.show(call.id());
   if (!target) return failure(target.error(), call);
   if (target->job.kind != kColonyKind) return invalid(call, "only a colony can be verified; this job is of kind " + target->job.kind);

@@ -46,7 +46,7 @@ http::Response command(Context& context, const Call& call,
                        Result<JobService::Commanded> (JobService::*method)(const std::string&, const std::string&)) {
   if (const Status arguments = check_no_arguments(call.request.body); !arguments)
     return failure(arguments.error(), call);
-  if (auto refused = refused_by_if_match(context, call)) return std::move(*refused);
+  if (auto refused = refused_by_preconditions(context, call)) return std::move(*refused);
   const auto done = (context.jobs.*method)(call.id(), call.request.principal.name);
   if (!done) return failure(done.error(), call);
   return job_response(context, done->changed ? 202 : 200, done->view);
@@ -131,7 +131,7 @@ http::Response pause_job(Context& context, const Call& call) { return command(co
 http::Response resume_job(Context& context, const Call& call) { return command(context, call, &JobService::resume); }
 
 http::Response delete_job(Context& context, const Call& call) {
-  if (auto refused = refused_by_if_match(context, call)) return std::move(*refused);
+  if (auto refused = refused_by_preconditions(context, call)) return std::move(*refused);
   const Status removed = context.jobs.remove(call.id());
   if (!removed) {
     // The one conflict that is not about an ended job.

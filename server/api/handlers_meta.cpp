@@ -40,7 +40,13 @@ http::Response get_openapi(Context& context, const Call& call) {
 }
 
 http::Response get_docs(Context& context, const Call& call) {
-  http::Response response = text_response(std::string(call.media) + "; charset=utf-8", context.docs_text);
+  // The address as the reader has it: Host has passed the gate. What a proxy says of the scheme can mislead none but who asks.
+  const http::Headers& headers = call.request.headers;
+  const bool is_https = context.config.is_encrypted ||
+                        (context.config.is_behind_proxy && headers.get("X-Forwarded-Proto").value_or("") == "https");
+  const std::string address = std::string(is_https ? "https://" : "http://") +
+                              std::string(headers.get("Host").value_or("127.0.0.1:8080")) + context.config.base_path;
+  http::Response response = text_response(std::string(call.media) + "; charset=utf-8", docs_at(context.docs_text, address));
   // The page is text and one style: nothing else may run or be fetched.
   response.headers.set("Content-Security-Policy",
                        "default-src 'none'; style-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'");

@@ -50,7 +50,7 @@ http::Response get_stream(Context& context, const Call& call) {
   response.headers.set("Content-Type", call.media);
   response.headers.set("Cache-Control", "no-store");
   response.headers.set("X-Accel-Buffering", "no");  // nginx would keep events back
-  response.stream = std::make_unique<PageStream>(context.jobs, context.config.base_path, std::move(*wish));
+  response.stream = std::make_unique<PageStream>(context.jobs, *context.pages, std::move(*wish));
   return response;
 }
 

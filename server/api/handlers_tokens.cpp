@@ -46,6 +46,16 @@ Result<http::KnownToken> known(const TokenRow& row) {
   return http::KnownToken{row.id, row.name, *scope, row.secret_hash, *expires};
 }
 
+/// Whether this token is valid, an admin's, and no other is.
+bool is_last_admin(const std::vector<TokenRow>& rows, const std::string& id) {
+  const std::string now = wall_time_text();  // such texts are in the order of time
+  bool is_one = false, is_other = false;
+  for (const TokenRow& row : rows) {
+    if (row.scope == "admin" && row.expires_at > now) (row.id == id ? is_one : is_other) = true;
+  }
+  return is_one && !is_other;
+}
+
 Result<TokenWish> decode_wish(const Json& body) {
   if (!body.is_object()) return Error{ErrorCode::kInvalid, "the body is wrong", {{"", "must be an object"}}};
   TokenWish wish;
@@ -83,8 +93,8 @@ Result<CreatedToken> create_token(TokenStore& store, const TokenWish& wish, cons
   std::vector<FieldError> errors;
   if (std::string fault = name_fault(wish.name); !fault.empty()) errors.push_back({"/name", std::move(fault)});
   if (!http::scope_from(wish.scope)) errors.push_back({"/scope", "must be read, submit or admin"});
-  if (!(wish.expires_h > 0.0 && wish.expires_h <= kTokenLifeMax_h)) {
-    errors.push_back({"/expires_h", "must be more than 0 and at most 87600 (ten years)"});
+  if (!(wish.expires_h >= kTokenLifeMin_h && wish.expires_h <= kTokenLifeMax_h)) {
+    errors.push_back({"/expires_h", "must be within 0.001 (3.6 s) and 87600 (ten years)"});
   }
   if (!errors.empty()) return Error{ErrorCode::kInvalid, "the token is described wrongly", std::move(errors)};
   auto secret = http::new_token();
@@ -95,9 +105,14 @@ Result<CreatedToken> create_token(TokenStore& store, const TokenWish& wish, cons
   token.secret_hash = http::hash_of_token(*secret);
   token.created_by = created_by;
   token.expires_at = wall_time_text_at(http::unix_time_ms() + std::llround(wish.expires_h * 3'600'000.0));
-  auto row = store.create(token);
-  if (!row) return row.error();
-  return CreatedToken{std::move(*row), std::move(*secret)};
+  auto made = store.create(token);
+  if (!made) return made.error();
+  return CreatedToken{std::move(made->row), std::move(*secret), std::move(made->removed)};
+}
+
+std::string removed_text(const TokenRow& row) {
+  return "token " + row.id + " of " + row.name + " (" + row.scope + "), expired at " + row.expires_at +
+         ", was removed to make room for a new one";
 }
 
 Status load_tokens(TokenStore& store, http::TokenTable& table) {
@@ -120,6 +135,10 @@ http::Response post_token(Context& context, const Call& call) {
   const std::lock_guard lock(context.tokens_mutex);
   const auto created = create_token(context.jobs.store().tokens(), *wish, call.request.principal.name);
   if (!created) return failure(created.error(), call);
+  for (const TokenRow& old : created->removed) {
+    context.tokens.remove(old.id);
+    if (context.config.jobs.log) context.config.jobs.log(removed_text(old));
+  }
   auto token = known(created->row);
   if (!token) return failure(token.error(), call);
   context.tokens.add(std::move(*token));
@@ -140,6 +159,17 @@ http::Response get_tokens(Context& context, const Call& call) {
 
 http::Response delete_token(Context& context, const Call& call) {
   const std::lock_guard lock(context.tokens_mutex);
+  // Where nobody needs a token (or asks as nobody's token), nobody can be locked out.
+  if (!call.request.principal.token_id.empty()) {
+    const auto rows = context.jobs.store().tokens().list();
+    if (!rows) return failure(rows.error(), call);
+    if (is_last_admin(*rows, call.id())) {
+      return problem_response(ProblemKind::kLastAdmin,
+                              {ErrorCode::kConflict, "no other valid token has scope admin, so nobody could make one any more; make another "
+                                                     "first. With the server stopped, `colonyd token create` makes one too"},
+                              call.request.request_id);
+    }
+  }
   const Status removed = context.jobs.store().tokens().remove(call.id());
   if (!removed) return failure(removed.error(), call);
   context.tokens.remove(call.id());
@@ -160,7 +190,7 @@ Json token_components() {
                                       {"scope", scope},
                                       {"expires_h",
                                        {{"type", "number"},
-                                        {"exclusiveMinimum", 0},
+                                        {"minimum", kTokenLifeMin_h},
                                         {"maximum", kTokenLifeMax_h},
                                         {"description", "hours from now"}}}})},
           {"Token", strict_object(token)},

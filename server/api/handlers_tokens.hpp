@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "engine/base/result.hpp"
 #include "server/api/json.hpp"
@@ -15,6 +16,7 @@
 namespace colony::server::api {
 
 inline constexpr std::size_t kTokenNameBytesMax = 64;
+inline constexpr double kTokenLifeMin_h = 0.001;     // 3.6 s: less is a slip of the unit
 inline constexpr double kTokenLifeMax_h = 87'600.0;  // ten years
 
 struct TokenWish {
@@ -26,10 +28,14 @@ struct TokenWish {
 struct CreatedToken {
   TokenRow row;
   std::string secret;
+  std::vector<TokenRow> removed;  // expired ones that gave way to it
 };
 
 /// Checks, makes and stores. Errors: kInvalid with fields /name, /scope, /expires_h; kLimit; kStorage.
 Result<CreatedToken> create_token(TokenStore& store, const TokenWish& wish, const std::string& created_by);
+
+/// What the log says of a token that gave way.
+std::string removed_text(const TokenRow& row);
 
 /// All stored tokens into the table, at the start.
 Status load_tokens(TokenStore& store, http::TokenTable& table);

@@ -39,6 +39,11 @@ Json query_schema(const QueryParam& param) {
   return Json::object();
 }
 
+constexpr std::string_view kStreamText =
+    "As `text/event-stream`: server-sent events. `EventSource` can read them only where no token is required, as it sends no `Authorization`, "
+    "and no token is taken from an address or a cookie; where tokens are required the stream is read with `fetch` and a ReadableStream. "
+    "`/docs` has such a reader, which takes a stream up again by `Last-Event-ID`.";
+
 std::string path_parameter_text(const std::string& name) {
   if (name == "step") return "name of a step of the analysis, as its result lists them";
   return "id, a UUIDv7 in lower case";
@@ -131,6 +136,9 @@ Json responses_of(const Endpoint& endpoint) {
     const std::string code(problem_row(kind).code);
     text += (text.empty() ? "" : "; ") + code;
   }
+  if (endpoint.method != "GET" && compared_by(endpoint) != Compared::kNothing) {
+    problems[412] = problem_row(ProblemKind::kPreconditionFailed).title;
+  }
   Json responses = Json::object();
   for (const auto& [status, description] : endpoint.answers) {
     responses[std::to_string(status)] = success_answer(endpoint, status, description);
@@ -191,6 +199,9 @@ Json openapi_document(std::span<const Endpoint> table, const SpecLimits& limits,
     Json operation = {
         {"operationId", endpoint.operation_id}, {"tags", Json::array({tag_of(endpoint)})},
         {"summary", endpoint.summary}, {"parameters", parameters_of(endpoint)}};
+    if (std::find(endpoint.media.begin(), endpoint.media.end(), "text/event-stream") != endpoint.media.end()) {
+      operation["description"] = kStreamText;
+    }
     if (endpoint.method == "POST" || endpoint.method == "PATCH") operation["requestBody"] = request_body_of(endpoint);
     if (const Json examples = request_examples(endpoint.operation_id); !examples.is_null()) {
       for (auto& [media, content] : operation["requestBody"]["content"].items()) content["examples"] = examples;

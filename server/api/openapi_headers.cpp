@@ -41,13 +41,6 @@ bool answers_a_job(const Endpoint& endpoint) {
   return endpoint.schema == "Job" || endpoint.operation_id == "submitJob";
 }
 
-bool compares_revisions(const Endpoint& endpoint) {
-  for (const std::string_view id : {"editJob", "deleteJob", "cancelJob", "pauseJob", "resumeJob"}) {
-    if (endpoint.operation_id == id) return true;
-  }
-  return false;
-}
-
 struct Group {
   std::string_view name, text;
 };
@@ -84,8 +77,13 @@ void add_header_parameters(const Endpoint& endpoint, Json& parameters) {
         "Preference-Applied did not wait",
         {{"type", "string"}});
   }
-  if (compares_revisions(endpoint)) {
+  if (endpoint.method == "GET") return;
+  if (compared_by(endpoint) == Compared::kJob) {
     add("If-Match", "only if the job has one of these revisions; of a tag only the part before the dot counts", pattern(kTagListPattern));
+    add("If-None-Match", "only if the job has none of these revisions, compared likewise", pattern(kTagListPattern));
+  } else if (compared_by(endpoint) == Compared::kGet) {
+    add("If-Match", "only if GET of this path has one of these tags now", pattern(kTagListPattern));
+    add("If-None-Match", "only if GET of this path has none of these tags now", pattern(kTagListPattern));
   }
 }
 

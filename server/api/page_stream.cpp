@@ -19,45 +19,44 @@ void append_message(std::string& out, std::string_view event, const Json& data) 
 
 }  // namespace
 
-PageStream::PageStream(JobService& jobs, std::string base_path, PageWish wish, Clock clock)
-    : jobs_(jobs), base_path_(std::move(base_path)), wish_(std::move(wish)), clock_(std::move(clock)) {}
+PageStream::PageStream(JobService& jobs, Pages& pages, PageWish wish, Clock clock)
+    : jobs_(jobs), pages_(pages), wish_(std::move(wish)), clock_(std::move(clock)) {}
 
 void PageStream::on_ready(std::function<void()> wake) {
-  subscription_ = jobs_.follow(std::nullopt, [this, wake = std::move(wake)](const JobNews& news) { hear(news, wake); });
+  subscription_ = pages_.subscribe([this, wake = std::move(wake)](const Pages::News& news) { hear(news, wake); });
 }
 
-void PageStream::hear(const JobNews& news, const std::function<void()>& wake) {
-  if (!wish_.is_all && !wish_.jobs.contains(news.job_key)) return;
+void PageStream::hear(const Pages::News& news, const std::function<void()>& wake) {
+  bool is_to_wake = news.is_too_much;
   {
     const std::lock_guard lock(news_.mutex);
-    switch (news.kind) {
-      case JobNews::Kind::kCommit:
-        // While progress waits for its turn, more of it wakes nobody: the stream comes back by itself.
-        if (!news_.in_turn.insert(news.job_key).second) return;
-        news_.progressed.push_back(news.job_key);
-        if (news_.progressed.size() > 1) return;
-        break;
-      case JobNews::Kind::kChange:
-        if (!news_.changed.insert(news.job_key).second) return;
-        break;
-      case JobNews::Kind::kRemoved:
-        news_.removed.push_back(news.id);
-        break;
+    for (const std::int64_t key : news.changed) {
+      if (shows(key) && news_.changed.insert(key).second) is_to_wake = true;
     }
-    if (news_.changed.size() + news_.removed.size() > kNewsMax) news_.is_too_much = true;
+    for (const auto& [key, id] : news.removed) {
+      if (!shows(key)) continue;
+      news_.removed.push_back(id);
+      is_to_wake = true;
+    }
+    for (const std::int64_t key : news.progressed) {
+      if (!shows(key) || !news_.in_turn.insert(key).second) continue;
+      // While progress waits for its turn, more of it wakes nobody: the stream comes back by itself.
+      if (news_.progressed.empty()) is_to_wake = true;
+      news_.progressed.push_back(key);
+    }
+    if (news.is_too_much || news_.changed.size() + news_.removed.size() > kNewsMax) news_.is_too_much = true;
   }
-  wake();
+  if (is_to_wake) wake();
 }
 
-void PageStream::tell(std::string& out, const JobView& view) {
-  const JobRow& job = view.job;
-  append_message(out, "job", encode_job(view, base_path_));
+void PageStream::tell(std::string& out, std::int64_t job_key, const JobMessage& message) {
+  out += message.text;
   if (!is_ready_) ++told_count_;
-  told_[job.job_key] = {job.id, job.revision, job.state};
-  if (!wish_.is_all || !is_terminal(job.state)) return;
+  told_[job_key] = {message.id, message.revision, message.state};
+  if (!wish_.is_all || !is_terminal(message.state)) return;
   // Its end can be announced twice, by the runner and by the command. What ended long ago is forgotten: a job more that is told
   // again is no harm, a list that grows for ever is.
-  ended_.push_back(job.job_key);
+  ended_.push_back(job_key);
   if (ended_.size() > kEndedKeptMax) {
     told_.erase(ended_.front());
     ended_.pop_front();
@@ -65,22 +64,24 @@ void PageStream::tell(std::string& out, const JobView& view) {
 }
 
 bool PageStream::look(std::string& out, std::int64_t job_key) {
-  const auto view = jobs_.show(job_key);
-  if (!view) return view.error().code == ErrorCode::kNotFound;  // gone: that is news of its own
+  const auto message = pages_.message_of(job_key);
+  if (!message) return message.error().code == ErrorCode::kNotFound;  // gone: that is news of its own
+  const JobMessage& job = **message;
   const auto told = told_.find(job_key);
-  const bool is_known =
-      told != told_.end() && told->second.revision == view->job.revision && told->second.state == view->job.state;
-  if (!is_known) tell(out, *view);
+  // A kept text can be of before what the state began with, as long as the news of that are on their way.
+  const bool is_known = told != told_.end() && (told->second.revision > job.revision ||
+                                                (told->second.revision == job.revision && told->second.state == job.state));
+  if (!is_known) tell(out, job_key, job);
   return true;
 }
 
 bool PageStream::begin(std::string& out) {
   if (!wish_.is_all) {
     for (const auto& [key, id] : wish_.jobs) {
-      const auto view = jobs_.show(key);
-      if (!view && view.error().code != ErrorCode::kNotFound) return false;
-      if (view) {
-        tell(out, *view);
+      const auto message = pages_.message_of(key);
+      if (!message && message.error().code != ErrorCode::kNotFound) return false;
+      if (message) {
+        tell(out, key, **message);
       } else {
         append_message(out, "deleted", {{"id", id}});
       }
@@ -94,7 +95,7 @@ bool PageStream::begin(std::string& out) {
     filter.state = kLive[state_index_];
     const auto page = jobs_.list(filter, kJobsPerRead, cursor_);
     if (!page) return false;
-    for (const JobView& view : page->items) tell(out, view);
+    for (const JobView& view : page->items) tell(out, view.job.job_key, *pages_.message_of(view));
     cursor_ = page->next.value_or("");
     if (!page->next) ++state_index_;
   }
@@ -145,12 +146,9 @@ void PageStream::tell_progress(std::string& out) {
   next_tick_ = now + kPageTick;
   for (const std::int64_t key : due) {
     const auto told = told_.find(key);
-    const auto progress = jobs_.live_progress(key);
-    // No runner any more, or not told of yet: the job itself is news then.
-    if (told == told_.end() || !progress) continue;
-    Json data = {{"id", told->second.id}, {"state", name_of(told->second.state)}, {"last_seq", progress->last_seq}};
-    data.update(encode_progress(*progress));
-    append_message(out, "progress", data);
+    if (told == told_.end()) continue;  // not told of yet: the job itself is news then
+    // None: no runner any more, and that is news too.
+    if (const auto text = pages_.progress_of(key, told->second.id, told->second.state)) out += *text;
   }
 }
 

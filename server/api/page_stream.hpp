@@ -3,7 +3,8 @@
 //          change: `event: job` (the whole job, when it is new or its revision has changed), `event: deleted`, and `event: progress`,
 //          of a job at most 5 times a second, of all together at most 50 times, each job in its turn. A message has no id: a reader
 //          that reconnects gets the whole state again, and knows by `ready` that what it held as not ended and was not told is over.
-// Cost:    what changes, not what is stored; progress is read from memory. Between two looks only the keys of jobs are kept, once each.
+// Cost:    what changes, not what is stored; progress is read from memory; texts are shared with all other pages (pages.hpp). Between two
+//          looks only the keys of jobs are kept, once each.
 // Errors:  when the storage fails, or more news waits than kNewsMax, the body ends (after `event: lagged`); the reader reconnects.
 // Threads: one pull at a time; news from any thread.
 #pragma once
@@ -19,6 +20,7 @@
 #include <string>
 #include <vector>
 
+#include "server/api/pages.hpp"
 #include "server/http/message.hpp"
 #include "server/jobs/service.hpp"
 
@@ -27,7 +29,6 @@ namespace colony::server::api {
 inline constexpr std::size_t kPageJobsMax = 100;  // that can be named
 inline constexpr std::chrono::milliseconds kPageTick{200};
 inline constexpr std::size_t kProgressPerTickMax = 10;
-inline constexpr std::size_t kNewsMax = 100'000;
 
 /// What the page shows; without a value: all jobs.
 struct PageWish {
@@ -39,7 +40,8 @@ struct PageWish {
 class PageStream : public http::BodySource {
  public:
   using Clock = std::function<std::chrono::steady_clock::time_point()>;
-  PageStream(JobService& jobs, std::string base_path, PageWish wish, Clock clock = std::chrono::steady_clock::now);
+  /// Both outlive it.
+  PageStream(JobService& jobs, Pages& pages, PageWish wish, Clock clock = std::chrono::steady_clock::now);
   Pull pull(std::string& out) override;
   std::optional<std::chrono::milliseconds> wake_after() override { return wake_after_; }
   void on_ready(std::function<void()> wake) override;
@@ -62,8 +64,9 @@ class PageStream : public http::BodySource {
     JobState state = JobState::kQueued;
   };
 
-  void hear(const JobNews& news, const std::function<void()>& wake);
-  void tell(std::string& out, const JobView& view);
+  bool shows(std::int64_t job_key) const { return wish_.is_all || wish_.jobs.contains(job_key); }
+  void hear(const Pages::News& news, const std::function<void()>& wake);
+  void tell(std::string& out, std::int64_t job_key, const JobMessage& message);
   /// Looks at one job that may have changed; false: the storage failed.
   bool look(std::string& out, std::int64_t job_key);
   /// A piece of the state at the beginning; false: the storage failed.
@@ -71,12 +74,12 @@ class PageStream : public http::BodySource {
   bool tell_changes(std::string& out);
   void tell_progress(std::string& out);
 
-  JobService& jobs_;
-  const std::string base_path_;
+  JobService& jobs_;  // fixed after construction
+  Pages& pages_;
   const PageWish wish_;
   const Clock clock_;
   News news_;                                                 // synchronises itself
-  std::unique_ptr<JobService::Subscription> subscription_;  // after news_: ends first
+  std::unique_ptr<Pages::Subscription> subscription_;         // after news_: ends first
   std::map<std::int64_t, Told> told_;
   std::deque<std::int64_t> ended_;  // of `all`: those in told_ that have ended, kEndedKeptMax at most
   std::size_t told_count_ = 0;

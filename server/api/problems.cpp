@@ -8,7 +8,7 @@
 namespace colony::server::api {
 namespace {
 
-constexpr std::array<ProblemRow, 17> kTable = {{
+constexpr std::array<ProblemRow, 18> kTable = {{
     {ProblemKind::kMalformed, 400, "malformed", "The request cannot be read", 0},
     {ProblemKind::kInvalid, 422, "invalid", "Fields of the request are wrong", 0},
     {ProblemKind::kNotFound, 404, "not-found", "There is no such thing", 0},
@@ -26,6 +26,7 @@ constexpr std::array<ProblemRow, 17> kTable = {{
     {ProblemKind::kNotAcceptable, 406, "not-acceptable", "None of the accepted media types is offered", 0},
     {ProblemKind::kEngineChanged, 409, "engine-changed", "The job is of a version that gives other results", 0},
     {ProblemKind::kPreconditionFailed, 412, "precondition-failed", "The resource is not as the request supposes", 0},
+    {ProblemKind::kLastAdmin, 409, "last-admin-token", "It is the last token with which tokens can be made", 0},
 }};
 
 }  // namespace

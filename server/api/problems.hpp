@@ -30,7 +30,8 @@ enum class ProblemKind {
   kUnsupportedMediaType,
   kNotAcceptable,
   kEngineChanged,
-  kPreconditionFailed
+  kPreconditionFailed,
+  kLastAdmin
 };
 
 /// Of one document; a list of 100,000 wrong positions needs no 100,000 lines of answer. The detail says how many there

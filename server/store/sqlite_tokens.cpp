@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "engine/base/check.hpp"
 #include "server/store/identity.hpp"
 
 namespace colony::server {
@@ -23,22 +24,38 @@ TokenRow row_at(const Statement& row) {
 
 }  // namespace
 
-Result<TokenRow> SqliteTokens::create(const NewToken& token) {
-  TokenRow made;
+Result<StoredToken> SqliteTokens::create(const NewToken& token) {
+  StoredToken made;
   const Status written = writer_.request([&](Connection& connection) -> Status {
-    Statement& count = connection.prepared("SELECT count(*) FROM token");
-    const std::int64_t stored = count.step() ? count.integer(0) : 0;
+    made = {};
+    const std::string now = wall_time_text();  // such texts are in the order of time
+    Statement& count = connection.prepared("SELECT count(*), coalesce(sum(expires_at > ?), 0) FROM token");
+    count.bind(std::string_view(now));
+    CHECK(count.step());
+    const std::int64_t stored = count.integer(0), valid = count.integer(1);
     count.reset();
-    if (stored >= static_cast<std::int64_t>(kTokensMax)) {
-      return Error{ErrorCode::kLimit, std::to_string(stored) + " tokens are stored, which is the limit: delete some"};
+    constexpr auto kMax = static_cast<std::int64_t>(kTokensMax);
+    if (valid >= kMax) {
+      return Error{ErrorCode::kLimit, std::to_string(valid) + " valid tokens are stored, which is the limit: delete some"};
     }
-    made = {new_job_id(), token.name, token.scope, token.secret_hash, token.created_by, wall_time_text(),
-            token.expires_at};
+    if (stored >= kMax) {
+      Statement& expired = connection.prepared(
+          "SELECT id, name, scope, secret_hash, created_by, created_at, expires_at FROM token WHERE expires_at <= ?"
+          " ORDER BY expires_at, token_key LIMIT ?");
+      expired.bind(std::string_view(now)).bind(stored - kMax + 1);
+      while (expired.step()) made.removed.push_back(row_at(expired));
+      expired.reset();
+      for (const TokenRow& old : made.removed) {
+        connection.prepared("DELETE FROM token WHERE id = ?").bind(std::string_view(old.id)).run();
+      }
+    }
+    made.row = {new_job_id(), token.name, token.scope, token.secret_hash, token.created_by, now, token.expires_at};
+    const TokenRow& row = made.row;
     Statement& to = connection.prepared(
         "INSERT INTO token (id, name, scope, secret_hash, created_by, created_at, expires_at) VALUES (?, ?, ?, ?, ?, ?, ?)");
-    to.bind(std::string_view(made.id)).bind(std::string_view(made.name)).bind(std::string_view(made.scope));
-    to.bind_blob(made.secret_hash).bind(std::string_view(made.created_by)).bind(std::string_view(made.created_at));
-    to.bind(std::string_view(made.expires_at)).run();
+    to.bind(std::string_view(row.id)).bind(std::string_view(row.name)).bind(std::string_view(row.scope));
+    to.bind_blob(row.secret_hash).bind(std::string_view(row.created_by)).bind(std::string_view(row.created_at));
+    to.bind(std::string_view(row.expires_at)).run();
     return Ok{};
   });
   if (!written) return written.error();

@@ -15,7 +15,7 @@ class SqliteTokens final : public TokenStore {
   /// Both outlive it.
   SqliteTokens(Writer& writer, ReaderPool& readers) : writer_(writer), readers_(readers) {}
 
-  Result<TokenRow> create(const NewToken& token) override;
+  Result<StoredToken> create(const NewToken& token) override;
   Result<std::vector<TokenRow>> list() override;
   Status remove(const std::string& id) override;
 

@@ -14,7 +14,7 @@
 
 namespace colony::server {
 
-/// Stored at the same time, expired ones included.
+/// Valid at the same time; and stored, since expired ones give way.
 inline constexpr std::size_t kTokensMax = 1000;
 
 struct NewToken {
@@ -34,11 +34,16 @@ struct TokenRow {
   std::string created_at, expires_at;
 };
 
+struct StoredToken {
+  TokenRow row;
+  std::vector<TokenRow> removed;  // expired ones that gave way to it
+};
+
 class TokenStore {
  public:
   virtual ~TokenStore() = default;
-  /// kLimit with kTokensMax stored.
-  virtual Result<TokenRow> create(const NewToken& token) = 0;
+  /// kLimit with kTokensMax valid ones. Where so many are stored, those that expired first are removed, as many as must be.
+  virtual Result<StoredToken> create(const NewToken& token) = 0;
   /// All, newest first.
   virtual Result<std::vector<TokenRow>> list() = 0;
   /// kNotFound for an unknown id.

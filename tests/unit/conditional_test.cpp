@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/api/analyse.hpp"
 #include "tests/unit/api_support.hpp"
 
 namespace colony::server::testing {
@@ -174,6 +175,102 @@ TEST(Lists, HaveTheTagOfTheirBytes) {
   fixture.jobs.row.name = "other";
   EXPECT_EQ(fixture.get("/v1/jobs", {{"If-None-Match", tag}}).status, 200);
   EXPECT_EQ(header(fixture.get("/healthz"), "ETag"), "");
+}
+
+// RFC 9110, 13.1: a precondition of a request that changes something is held, or the request refused; no operation passes one over.
+TEST(Preconditions, OfUnsafeMethodsAreNeverPassedOver) {
+  for (const api::Endpoint& endpoint : api::endpoints()) {
+    if (endpoint.method == "GET") continue;
+    ApiFixture fixture;
+    fixture.jobs.row.revision = 3;
+    std::string path(endpoint.path);
+    if (const std::size_t at = path.find("{job_id}"); at != std::string::npos) path.replace(at, 8, kJobId);
+    if (path.find('{') != std::string::npos) continue;  // of things that are not there yet: below
+    const std::string method(endpoint.method);
+    const std::string type = endpoint.body_media.empty() ? "application/json" : std::string(endpoint.body_media.front());
+    const bool is_about_nothing = api::compared_by(endpoint) == api::Compared::kNothing;
+    const std::string body = endpoint.operation_id == "editJob"   ? R"({"name": "new"})"
+                             : endpoint.operation_id == "forkJob" ? R"({"at_h": 1, "until": {"cells": 9}})"
+                                                                  : "";
+    for (const auto& [name, value] : std::vector<std::pair<std::string, std::string>>{
+             {"If-Match", "\"other\""}, {"If-Match", "W/\"3.1\""}, {"If-None-Match", "*"}}) {
+      auto response = fixture.ask(method, path, {{"Content-Type", type}, {name, value}}, body);
+      EXPECT_EQ(response.status, is_about_nothing ? 400 : 412) << method << " " << path << " " << name << ": " << value;
+      EXPECT_THAT(faults(response), ElementsAre(name));
+      EXPECT_TRUE(fixture.jobs.submitted.empty());
+      EXPECT_EQ(fixture.jobs.last_actor, "") << method << " " << path;
+      EXPECT_EQ(fixture.jobs.row.revision, 3u);
+    }
+    EXPECT_EQ(fixture.ask(method, path, {{"Content-Type", type}, {"If-Match", "x"}}, body).status, 400);
+  }
+  ApiFixture fixture;
+  for (const char* header : {"If-Match", "If-None-Match"}) {
+    EXPECT_EQ(fixture.post("/v1/tokens", R"({"name": "a", "scope": "read", "expires_h": 1})", {{header, "*"}}).status, 400);
+    EXPECT_EQ(fixture.ask("DELETE", "/v1/tokens/x", {{header, "\"a\""}}).status, 400);
+  }
+  auto tokens = fixture.get("/v1/tokens");
+  EXPECT_TRUE(json_of(tokens)["items"].empty());
+}
+
+TEST(Preconditions, OfAJobAreHeldAgainstItsRevision) {
+  ApiFixture fixture;
+  fixture.jobs.row.revision = 3;
+  const auto status = [&](const std::string& what, const char* header, const char* value) {
+    return what == "DELETE" ? fixture.ask("DELETE", kJob, {{header, value}}).status
+           : what == "PATCH"
+               ? fixture.ask("PATCH", kJob, {{"Content-Type", "application/merge-patch+json"}, {header, value}}, "{}").status
+               : fixture.post(kJob + what, what == "/fork" ? R"({"at_h": 1, "until": {"cells": 9}})" : "", {{header, value}}).status;
+  };
+  for (const char* what : {"/cancel", "/pause", "/resume", "/fork", "/verify", "PATCH", "DELETE"}) {
+    fixture.jobs.row.revision = 3;
+    EXPECT_EQ(status(what, "If-None-Match", "\"3.99\""), 412) << what;
+    EXPECT_EQ(status(what, "If-None-Match", "\"1.1\", W/\"3.0\""), 412) << what;
+    EXPECT_EQ(status(what, "If-Match", "\"2.0\""), 412) << what;
+    EXPECT_LT(status(what, "If-None-Match", "\"2.0\", \"other\""), 300) << what;
+    fixture.jobs.row.revision = 3;
+    EXPECT_LT(status(what, "If-Match", "\"2.0\", \"3.0\""), 300) << what;
+    EXPECT_LT(status(what, "If-Match", "*"), 300) << what;
+  }
+  const std::string none = "/v1/jobs/01890000-0000-7000-8000-00000000ffff/verify";
+  EXPECT_EQ(fixture.post(none, "", {{"If-None-Match", "*"}}).status, 404);
+}
+
+// A repetition of what was done already is answered as before, whatever became of the origin meanwhile (13.1.1 allows it).
+TEST(Preconditions, DoNotUndoAnIdempotencyKey) {
+  ApiFixture fixture;
+  fixture.jobs.row.revision = 3;
+  const std::vector<std::pair<std::string, std::string>> headers = {{"Idempotency-Key", "k"}, {"If-Match", "\"3.0\""}};
+  EXPECT_EQ(fixture.post(kJob + "/verify", "", headers).status, 201);
+  fixture.jobs.row.revision = 4;
+  EXPECT_EQ(fixture.post(kJob + "/verify", "", headers).status, 200);
+  EXPECT_EQ(fixture.post(kJob + "/verify", "", {{"Idempotency-Key", "other"}, {"If-Match", "\"3.0\""}}).status, 412);
+}
+
+TEST(Preconditions, OfOtherThingsAreHeldAgainstTheirGet) {
+  ApiFixture fixture;
+  const std::string tag = header(fixture.get("/v1/jobs"), "ETag");
+  const std::string spec = R"({"until": {"cells": 5}})";
+  EXPECT_EQ(fixture.post("/v1/jobs", spec, {{"If-None-Match", tag}}).status, 412);
+  EXPECT_EQ(fixture.post("/v1/jobs", spec, {{"If-Match", "W/" + tag}}).status, 412) << "a weak tag is no match";
+  EXPECT_TRUE(fixture.jobs.submitted.empty());
+  EXPECT_EQ(fixture.post("/v1/jobs", spec, {{"If-Match", tag}}).status, 201);
+  EXPECT_EQ(fixture.post("/v1/jobs", spec, {{"If-None-Match", "\"other\""}}).status, 201);
+  // An analysis: its tag is that of its bytes.
+  AnalysisStore& analyses = fixture.jobs.store().analyses();
+  NewAnalysis wanted;
+  wanted.options_json = api::to_text(api::encode_image_options({}));
+  wanted.media_type = "image/png";
+  wanted.image = "not looked at";
+  const auto made = analyses.create(wanted, {1'000'000, 10});
+  ASSERT_TRUE(made) << made.error().message;
+  const std::string path = "/v1/analyses/" + made->id;
+  const std::string of_it = header(fixture.get(path), "ETag");
+  ASSERT_NE(of_it, "");
+  EXPECT_EQ(fixture.ask("DELETE", path, {{"If-Match", "\"other\""}}).status, 412);
+  EXPECT_EQ(fixture.ask("DELETE", path, {{"If-None-Match", of_it}}).status, 412);
+  EXPECT_EQ(fixture.ask("DELETE", path, {{"If-None-Match", "*"}}).status, 412);
+  EXPECT_EQ(fixture.ask("DELETE", path, {{"If-Match", of_it}}).status, 204);
+  EXPECT_EQ(fixture.ask("DELETE", path, {{"If-Match", of_it}}).status, 404);
 }
 
 TEST(Links, LeadThroughEveryPageOfEvents) {

@@ -33,7 +33,51 @@ TEST(Docs, TellEveryOperationAndSchema) {
   for (const auto& [name, schema] : openapi["components"]["schemas"].items())
     EXPECT_THAT(page, HasSubstr("<article id=\"schema-" + name + "\">"));
   EXPECT_THAT(page, HasSubstr("href=\"/colony/docs.css\""));
-  EXPECT_THAT(page, HasSubstr("http://127.0.0.1:8080/colony/v1/jobs"));
+}
+
+TEST(Docs, ShowTheAddressTheyWereAskedAt) {
+  api::ApiConfig config = ApiFixture::config();
+  config.base_path = "/colony";
+  config.is_behind_proxy = true;
+  ApiFixture fixture(config);
+  const auto base = [&](std::vector<std::pair<std::string, std::string>> headers) {
+    const std::string page = fixture.get("/docs", std::move(headers)).body;
+    EXPECT_THAT(page, Not(HasSubstr(std::string(api::kDocsAddress))));
+    const std::size_t at = page.find("BASE=&#39;") == std::string::npos ? page.find("BASE='") : page.find("BASE=&#39;");
+    return page.substr(at, page.find('\n', at) - at);
+  };
+  EXPECT_EQ(base({}), "BASE='http://127.0.0.1:8080/colony'");
+  EXPECT_EQ(base({{"Host", "lab.example:444"}}), "BASE='http://lab.example:444/colony'");
+  EXPECT_EQ(base({{"Host", "lab.example"}, {"X-Forwarded-Proto", "https"}}), "BASE='https://lab.example/colony'");
+  EXPECT_EQ(base({{"Host", "'<a>"}}), "BASE='http://&#39;&lt;a&gt;/colony'");
+  EXPECT_THAT(fixture.get("/docs").body, HasSubstr("curl &quot;$BASE/v1/jobs&quot;"));
+}
+
+TEST(Docs, SendATokenWhereOneIsNeeded) {
+  api::ApiConfig config = ApiFixture::config();
+  EXPECT_THAT(ApiFixture(config).get("/docs").body, Not(HasSubstr("Bearer $TOKEN")));
+  config.tokens_required = true;
+  ApiFixture fixture(config);
+  const std::string page = fixture.get("/docs").body;
+  for (const api::Endpoint& endpoint : api::endpoints()) {
+    const std::size_t article = page.find("<article id=\"" + std::string(endpoint.operation_id) + "\">");
+    const std::string example = page.substr(page.find("<h4>Example</h4>", article), 200);
+    const bool is_open = api::access_of(endpoint) == http::Access::kOpen;
+    EXPECT_EQ(example.find("Authorization: Bearer $TOKEN") == std::string::npos, is_open) << endpoint.operation_id;
+  }
+}
+
+// Who finds out by trying that EventSource sends no token has lost an afternoon.
+TEST(Docs, SayHowAStreamIsReadWithAToken) {
+  ApiFixture fixture;
+  auto document = fixture.get("/openapi.json");
+  const Json openapi = json_of(document);
+  for (const char* path : {"/v1/stream", "/v1/jobs/{job_id}/events"}) {
+    const std::string text = openapi["paths"][path]["get"]["description"];
+    EXPECT_THAT(text, HasSubstr("`EventSource`"));
+    EXPECT_THAT(text, HasSubstr("`fetch`"));
+  }
+  EXPECT_THAT(fixture.get("/docs").body, HasSubstr("async function readStream("));
 }
 
 TEST(Docs, RunAndLoadNothing) {
@@ -67,7 +111,7 @@ TEST(Docs, EscapeEveryText) {
                          {{"200", {{"description", evil}, {"content", {{evil, {{"schema", {{"const", evil}}}}}}}, {"headers", {{evil, {{"description", evil}}}}}}},
                           {"404", {{"description", evil}}}}}}}}}}},
                   {"components", {{"schemas", {{evil, {{"properties", {{evil, {{"type", evil}, {"description", evil}}}}}}}}}}}};
-  const std::string page = api::docs_page(openapi, "/" + evil);
+  const std::string page = api::docs_page(openapi, "/" + evil, true);
   EXPECT_THAT(page, Not(HasSubstr("<script")));
   EXPECT_THAT(page, HasSubstr("&lt;script&gt;alert(&#39;&quot;&amp;&quot;)&lt;/script&gt;"));
 }

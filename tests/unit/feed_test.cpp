@@ -58,6 +58,7 @@ class GrowingJobs : public FakeJobs {
   }
   Result<std::vector<Event>> events(const std::string& id, const EventFilter& filter, std::size_t limit) override {
     ++read_count;
+    if (reads_until_failure > 0 && --reads_until_failure == 0) return Error{ErrorCode::kStorage, "the disk is sick"};
     const std::lock_guard lock(mutex_);
     if (!filter.kinds.empty() || filter.cell_id) return FakeJobs::events(id, filter, limit);
     const std::size_t end = std::min(stored, history.size());
@@ -69,6 +70,7 @@ class GrowingJobs : public FakeJobs {
     return hub_->follow(job_key, [wake = std::move(wake)](const JobNews&) { wake(); });
   }
   std::atomic<int> read_count{0};
+  int reads_until_failure = 0;  // of one thread
 
  private:
   std::mutex mutex_;  // guards stored and row
@@ -273,6 +275,32 @@ TEST(Feed, OfADeletedJobEndsItsStreamsWithoutEnd) {
   feeds.refresh_stale();
   EXPECT_EQ(pull(*reader.stream, false, reader.text), Pull::kEnd);
   EXPECT_THAT(reader.text, Not(HasSubstr("event: end")));
+}
+
+TEST(Feed, ReadingsThatFailHalfWayLeaveNothing) {
+  GrowingJobs jobs(1000);
+  api::Feeds feeds(jobs, api::Feeds::Mode::kByHand);
+  Reader reader;
+  reader.stream = std::make_unique<api::EventStream>(jobs, feeds, jobs.view(), reader.wish);
+  reader.stream->on_ready([] {});
+  pull(*reader.stream, true, reader.text);
+  feeds.refresh_stale();
+  for (int failures = 0; failures < 40; ++failures) {
+    jobs.grow(1000);
+    jobs.reads_until_failure = 3;  // two pages, and with them whole pieces, were read: 5 MiB in all
+    feeds.refresh_stale();
+    ASSERT_EQ(jobs.reads_until_failure, 0);
+  }
+  // Before this watcher has looked, all is well again: nobody tells it that anything was not.
+  jobs.grow(1000, true);
+  feeds.refresh_stale();
+  std::string own;
+  const auto ready = reader.stream->pull_now(own);
+  ASSERT_TRUE(ready && ready->shared) << "what was kept twice would have pushed out what this one needs";
+  reader.text += *ready->shared + own;
+  while (pull(*reader.stream, false, reader.text) != Pull::kEnd) {
+  }
+  EXPECT_EQ(events_of(reader.text), expected_text(jobs, reader.wish));
 }
 
 TEST(Feed, LivesAsLongAsItIsWatched) {

@@ -11,6 +11,42 @@ namespace {
 
 using namespace std::string_literals;
 
+/// GET /door: passes when it is open.
+void add_door(Router& router, Door& door, Router::Weight weight) {
+  router.add(
+      "GET", "/door",
+      [&door](const Request&) {
+        door.pass();
+        return text("passed");
+      },
+      weight);
+}
+
+/// One request at the door, and two more where there is room for one to wait: the other is refused. Which one, the kernel decides.
+class CrowdedDoor {
+ public:
+  CrowdedDoor(std::uint16_t port, Door& door) : door_(door), running_(port), a_(port), b_(port) {
+    running_.send(get("/door"));
+    door_.wait_for_arrivals(1);
+    a_.send(get("/door"));
+    b_.send(get("/door"));
+    while (!a_.is_readable(5) && !b_.is_readable(5)) {
+    }
+    is_a_refused_ = a_.is_readable(0);
+  }
+  Reply refusal() { return (is_a_refused_ ? a_ : b_).read_reply(); }
+  void open() {
+    door_.open();
+    EXPECT_EQ(running_.read_reply().body, "passed");
+    EXPECT_EQ((is_a_refused_ ? b_ : a_).read_reply().body, "passed");
+  }
+
+ private:
+  Door& door_;
+  RawClient running_, a_, b_;
+  bool is_a_refused_ = false;
+};
+
 // Minutes of drawing must not keep those out who only look.
 TEST(HttpLimits, HeavyRequestsHaveAQueueOfTheirOwn) {
   ServerConfig config;
@@ -19,34 +55,17 @@ TEST(HttpLimits, HeavyRequestsHaveAQueueOfTheirOwn) {
   Door door;
   TestServer server(
       [&door](Router& router) {
-        router.add(
-            "GET", "/door",
-            [&door](const Request&) {
-              door.pass();
-              return text("passed");
-            },
-            Router::Weight::kHeavy);
+        add_door(router, door, Router::Weight::kHeavy);
         router.add("GET", "/light", [](const Request&) { return text("light"); });
       },
       config);
   server.run();
-  RawClient running(server.port());
-  running.send(get("/door"));
-  door.wait_for_arrivals(1);
-  RawClient a(server.port());
-  RawClient b(server.port());
-  a.send(get("/door"));
-  b.send(get("/door"));
-  while (!a.is_readable(5) && !b.is_readable(5)) {
-  }
-  const bool a_is_refused = a.is_readable(0);
-  EXPECT_EQ((a_is_refused ? a : b).read_reply().status, 503);
+  CrowdedDoor crowd(server.port(), door);
+  EXPECT_EQ(crowd.refusal().status, 503);
   RawClient light(server.port());
   light.send(get("/light"));
   EXPECT_EQ(light.read_reply().body, "light");
-  door.open();
-  EXPECT_EQ(running.read_reply().body, "passed");
-  EXPECT_EQ((a_is_refused ? b : a).read_reply().body, "passed");
+  crowd.open();
 }
 
 TEST(HttpLimits, AFullQueueIsToldAtOnce) {
@@ -54,32 +73,13 @@ TEST(HttpLimits, AFullQueueIsToldAtOnce) {
   config.worker_threads = 1;
   config.requests_waiting_max = 1;
   Door door;
-  TestServer server(
-      [&door](Router& router) {
-        router.add("GET", "/door", [&door](const Request&) {
-          door.pass();
-          return text("passed");
-        });
-      },
-      config);
+  TestServer server([&door](Router& router) { add_door(router, door, Router::Weight::kLight); }, config);
   server.run();
-  RawClient running(server.port());
-  running.send(get("/door"));
-  door.wait_for_arrivals(1);
-  // One of these two waits and the other is refused; which one, the kernel decides.
-  RawClient a(server.port());
-  RawClient b(server.port());
-  a.send(get("/door"));
-  b.send(get("/door"));
-  while (!a.is_readable(5) && !b.is_readable(5)) {
-  }
-  const bool a_is_refused = a.is_readable(0);
-  const Reply refused = (a_is_refused ? a : b).read_reply();
+  CrowdedDoor crowd(server.port(), door);
+  const Reply refused = crowd.refusal();
   EXPECT_EQ(refused.status, 503);
   EXPECT_EQ(refused.header("Retry-After"), "1");
-  door.open();
-  EXPECT_EQ(running.read_reply().body, "passed");
-  EXPECT_EQ((a_is_refused ? b : a).read_reply().body, "passed");
+  crowd.open();
 }
 
 TEST(HttpLimits, LargeBodiesAreCounted) {
@@ -121,13 +121,7 @@ TEST(HttpLimits, HeavyRequestsLeaveThreadsForTheOthers) {
   Door door;
   TestServer server(
       [&door](Router& router) {
-        router.add(
-            "GET", "/door",
-            [&door](const Request&) {
-              door.pass();
-              return text("passed");
-            },
-            Router::Weight::kHeavy);
+        add_door(router, door, Router::Weight::kHeavy);
         router.add("GET", "/light", [](const Request&) { return text("light"); });
       },
       config);

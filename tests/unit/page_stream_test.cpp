@@ -1,7 +1,11 @@
 // The stream of a page: state first, then changes; progress in turn and bounded; the clock is the test's.
+#include <atomic>
+#include <future>
 #include <map>
 #include <set>
 #include <string>
+#include <thread>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -25,7 +29,9 @@ class ManyJobs : public FakeJobs {
   using FakeJobs::show;
   std::map<std::int64_t, JobRow> rows;
   int shows = 0;
+  int progress_reads = 0;
   int pages = 0;
+  std::function<void()> during_show;
 
   JobRow& add(std::int64_t key, JobState state) {
     JobRow& one = rows[key] = row;
@@ -36,11 +42,13 @@ class ManyJobs : public FakeJobs {
   }
   Result<JobView> show(std::int64_t key) override {
     ++shows;
+    if (during_show) std::exchange(during_show, nullptr)();
     const auto found = rows.find(key);
     if (found == rows.end()) return Error{ErrorCode::kNotFound, "gone"};
     return JobView{found->second, progress};
   }
   std::optional<Progress> live_progress(std::int64_t key) override {
+    ++progress_reads;
     Progress now = progress;
     now.last_seq = static_cast<std::uint64_t>(1000 + key);
     return rows.contains(key) && rows[key].state == JobState::kRunning ? std::optional(now) : std::nullopt;
@@ -64,7 +72,7 @@ class ManyJobs : public FakeJobs {
 class PageStreamTest : public ::testing::Test {
  protected:
   api::PageStream& open(api::PageWish wish) {
-    stream_ = std::make_unique<api::PageStream>(jobs_, "/base", std::move(wish), [this] { return now_; });
+    stream_ = std::make_unique<api::PageStream>(jobs_, pages_, std::move(wish), [this] { return now_; });
     stream_->on_ready([this] { ++wakes_; });
     return *stream_;
   }
@@ -92,9 +100,16 @@ class PageStreamTest : public ::testing::Test {
     }
     return out;
   }
-  void hear(std::int64_t key, Kind kind) { jobs_.hearer({key, kind, kind == Kind::kRemoved ? "id-" + std::to_string(key) : ""}); }
+  void announce(std::int64_t key, Kind kind) {
+    jobs_.hearer({key, kind, kind == Kind::kRemoved ? "id-" + std::to_string(key) : ""});
+  }
+  void hear(std::int64_t key, Kind kind) {
+    announce(key, kind);
+    pages_.distribute();
+  }
 
   ManyJobs jobs_;
+  api::Pages pages_{jobs_, "/base", api::Pages::Mode::kByHand};
   std::chrono::steady_clock::time_point now_{std::chrono::hours(1)};
   std::unique_ptr<api::PageStream> stream_;
   int wakes_ = 0;
@@ -234,9 +249,105 @@ TEST_F(PageStreamTest, CostsWhatChangesNotWhatIsStored) {
 TEST_F(PageStreamTest, AReaderThatIsTooFarBehindIsSentAway) {
   open_all();
   drawn();
-  for (std::int64_t key = 0; key <= static_cast<std::int64_t>(api::kNewsMax); ++key) hear(key, Kind::kChange);
+  for (std::int64_t key = 0; key <= static_cast<std::int64_t>(api::kNewsMax); ++key) {
+    announce(key, Kind::kChange);
+    if (key == 1000) pages_.distribute();
+  }
+  pages_.distribute();
   EXPECT_THAT(drawn(), ElementsAre("lagged"));
   EXPECT_EQ(ended_, Pull::kEnd);
+}
+
+TEST_F(PageStreamTest, AThousandPagesCostOneReadingAndOneEncoding) {
+  jobs_.add(1, JobState::kRunning);
+  jobs_.add(2, JobState::kQueued);
+  std::vector<std::unique_ptr<api::PageStream>> streams;
+  const auto pull_all = [&] {
+    std::set<std::string> texts;
+    for (const auto& stream : streams) {
+      std::string text;
+      while (true) {
+        std::string piece;
+        const Pull pulled = stream->pull(piece);
+        text += piece;
+        if (pulled != Pull::kMore) break;
+      }
+      texts.insert(text);
+    }
+    return texts;
+  };
+  for (int i = 0; i < 1000; ++i) {
+    api::PageWish wish;
+    wish.is_all = true;
+    streams.push_back(std::make_unique<api::PageStream>(jobs_, pages_, wish, [this] { return now_; }));
+    streams.back()->on_ready([this] { ++wakes_; });
+  }
+  EXPECT_EQ(pull_all().size(), 1u);
+  const JobView queued{jobs_.rows[2], jobs_.progress};
+  EXPECT_EQ(pages_.message_of(queued), pages_.message_of(queued)) << "what each page reads for itself is encoded once, too";
+  jobs_.rows[1].revision = 5;
+  announce(1, Kind::kChange);
+  EXPECT_EQ(wakes_, 0) << "who announces does not wake a thousand";
+  pages_.distribute();
+  EXPECT_EQ(wakes_, 1000);
+  EXPECT_THAT(*pull_all().begin(), HasSubstr("\"revision\":5"));
+  EXPECT_EQ(jobs_.shows, 1);
+  hear(1, Kind::kCommit);
+  const auto progress = pull_all();
+  EXPECT_EQ(progress.size(), 1u);
+  EXPECT_THAT(*progress.begin(), ::testing::StartsWith("event: progress\n"));
+  EXPECT_EQ(jobs_.progress_reads, 1);
+  EXPECT_EQ(jobs_.shows, 1);
+}
+
+TEST_F(PageStreamTest, ATextThatWasReadBeforeNewsIsNotGivenAfterThem) {
+  jobs_.add(1, JobState::kRunning);
+  open_all();
+  drawn();
+  jobs_.rows[1].revision = 2;
+  jobs_.during_show = [this] { announce(1, Kind::kChange); };  // while it is read it changes again
+  hear(1, Kind::kChange);
+  EXPECT_THAT(drawn(), ElementsAre("job id-1"));
+  jobs_.rows[1].revision = 3;
+  pages_.distribute();
+  EXPECT_THAT(drawn(), ElementsAre("job id-1"));
+  EXPECT_THAT(text_, HasSubstr("\"revision\":3"));
+  // Progress likewise, and it says the state that this page was told.
+  hear(1, Kind::kCommit);
+  EXPECT_THAT(drawn(), ElementsAre("progress id-1"));
+  EXPECT_EQ(pages_.progress_of(1, "id-1", JobState::kRunning), pages_.progress_of(1, "id-1", JobState::kRunning));
+  EXPECT_THAT(*pages_.progress_of(1, "id-1", JobState::kPaused), HasSubstr("\"state\":\"paused\""));
+  // When nobody looks, nothing is heard: what was kept counts no more.
+  stream_.reset();
+  jobs_.rows[1].revision = 4;
+  announce(1, Kind::kChange);
+  open_all();
+  EXPECT_EQ((*pages_.message_of(1))->revision, 4u);
+}
+
+TEST_F(PageStreamTest, WhatIsOlderThanWhatWasToldIsNotTold) {
+  jobs_.add(1, JobState::kRunning).revision = 3;
+  open_all();
+  ASSERT_TRUE(pages_.message_of(1));
+  jobs_.rows[1].revision = 4;  // committed, and its news are on their way
+  EXPECT_THAT(drawn(), ElementsAre("job id-1", "ready"));
+  jobs_.rows[1].revision = 3;
+  hear(1, Kind::kChange);
+  EXPECT_THAT(drawn(), ElementsAre());
+}
+
+TEST(Pages, TellFromAThreadOfTheirOwn) {
+  ManyJobs jobs;
+  api::Pages pages(jobs, "");
+  std::promise<std::pair<std::thread::id, std::set<std::int64_t>>> heard;
+  std::atomic<bool> is_first{true};
+  const auto subscription = pages.subscribe([&](const api::Pages::News& news) {
+    if (is_first.exchange(false)) heard.set_value({std::this_thread::get_id(), news.changed});
+  });
+  jobs.hearer({7, Kind::kChange, {}});
+  const auto [thread, keys] = heard.get_future().get();
+  EXPECT_NE(thread, std::this_thread::get_id());
+  EXPECT_THAT(keys, ElementsAre(7));
 }
 
 TEST(StreamOfAPage, IsAskedForByIdsOrAll) {

@@ -1,4 +1,6 @@
 // Tokens in the database: what is kept, what is refused, and that it lasts.
+#include <algorithm>
+
 #include <gtest/gtest.h>
 #include <sqlite3.h>
 
@@ -38,13 +40,13 @@ TEST_F(TokenStoreTest, WhatWasStoredIsThereAfterARestartAndGoneAfterARemoval) {
   auto rows = store_->tokens().list();
   ASSERT_TRUE(rows);
   ASSERT_EQ(rows->size(), 2u);
-  EXPECT_EQ((*rows)[0].id, second->id) << "newest first";
+  EXPECT_EQ((*rows)[0].id, second->row.id) << "newest first";
   EXPECT_EQ((*rows)[1].secret_hash, token(1).secret_hash);
   EXPECT_EQ((*rows)[1].scope, "read");
   EXPECT_EQ((*rows)[1].expires_at, "2030-01-02T03:04:05.678Z");
   EXPECT_EQ((*rows)[1].created_by, "local");
-  ASSERT_TRUE(store_->tokens().remove(first->id));
-  EXPECT_EQ(store_->tokens().remove(first->id).error().code, ErrorCode::kNotFound);
+  ASSERT_TRUE(store_->tokens().remove(first->row.id));
+  EXPECT_EQ(store_->tokens().remove(first->row.id).error().code, ErrorCode::kNotFound);
   open();
   EXPECT_EQ(store_->tokens().list()->size(), 1u);
 }
@@ -72,6 +74,33 @@ TEST_F(TokenStoreTest, ThereIsALimit) {
   EXPECT_EQ(store_->tokens().create(token(9)).error().code, ErrorCode::kLimit);
   ASSERT_TRUE(store_->tokens().remove(store_->tokens().list()->back().id));
   EXPECT_TRUE(store_->tokens().create(token(9)));
+}
+
+TEST_F(TokenStoreTest, ExpiredOnesDoNotCountAndGiveWayOldestFirst) {
+  store_.reset();
+  sqlite3* db = nullptr;
+  ASSERT_EQ(sqlite3_open((dir_.path() + "/colony.db").c_str(), &db), SQLITE_OK);
+  // The last two are valid.
+  const std::string rows =
+      "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < " + std::to_string(kTokensMax) +
+      ") INSERT INTO token (id, name, scope, secret_hash, created_by, created_at, expires_at)"
+      " SELECT 'id-' || i, 'x', 'read', randomblob(32), 'x', 'x',"
+      " printf('20%02d-01-01T00:00:%02d.000Z', CASE WHEN i > " + std::to_string(kTokensMax - 2) +
+      " THEN 99 ELSE 20 END, (i * 7) % 60) FROM n";
+  EXPECT_EQ(sqlite3_exec(db, rows.c_str(), nullptr, nullptr, nullptr), SQLITE_OK) << sqlite3_errmsg(db);
+  sqlite3_close(db);
+  open();
+  const auto made = store_->tokens().create(token(8));
+  ASSERT_TRUE(made) << made.error().message;
+  ASSERT_EQ(made->removed.size(), 1u) << "no more than must be: the others say who had a token";
+  EXPECT_EQ(made->removed[0].expires_at, "2020-01-01T00:00:00.000Z");
+  EXPECT_EQ(made->removed[0].id, "id-60");
+  const auto next = store_->tokens().create(token(9));
+  ASSERT_TRUE(next);
+  EXPECT_EQ(next->removed.at(0).id, "id-120");
+  const auto kept = *store_->tokens().list();
+  EXPECT_EQ(kept.size(), kTokensMax);
+  EXPECT_EQ(std::count_if(kept.begin(), kept.end(), [](const TokenRow& row) { return row.expires_at > "2090"; }), 2);
 }
 
 TEST_F(TokenStoreTest, TheLogSaysWhoAsked) {

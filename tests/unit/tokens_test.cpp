@@ -1,4 +1,7 @@
 // Tokens over the interface, and what each operation needs.
+#include <thread>
+#include <vector>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -58,13 +61,78 @@ TEST(Tokens, EveryFaultIsNamedAndNothingIsMade) {
     EXPECT_THAT(wrong(R"({"scope": "read", "expires_h": 1, "name": ")" + std::string(name) + "\"}"), ElementsAre("/name"))
         << name;
   }
-  for (const char* hours : {"-1", "87600.1", "1e300"}) {
+  for (const char* hours : {"-1", "0", "0.0009", "87600.1", "1e300"}) {
     EXPECT_THAT(wrong(R"({"scope": "read", "name": "x", "expires_h": )" + std::string(hours) + "}"),
                 ElementsAre("/expires_h"));
   }
   EXPECT_EQ(api.post("/v1/tokens", "{").status, 400);
   http::Response list = api.get("/v1/tokens");
   EXPECT_TRUE(json_of(list)["items"].empty());
+}
+
+TEST(Tokens, TheSchemaStatesTheRangeThatIsChecked) {
+  ApiFixture api;
+  http::Response response = api.get("/openapi.json");
+  const api::Json range = json_of(response)["components"]["schemas"]["NewToken"]["properties"]["expires_h"];
+  for (const char* bound : {"minimum", "maximum"}) {
+    const api::Json wish = {{"name", "x"}, {"scope", "read"}, {"expires_h", range.at(bound)}};
+    EXPECT_EQ(api.post("/v1/tokens", wish.dump()).status, 201) << bound;
+  }
+}
+
+// Where tokens are needed somebody must be able to make one.
+TEST(Tokens, TheLastValidAdminStays) {
+  ApiFixture api;
+  const auto make = [&](const char* scope) {
+    http::Response made = api.post("/v1/tokens", R"({"name": "x", "expires_h": 1, "scope": ")" + std::string(scope) + "\"}");
+    return json_of(made)["id"].get<std::string>();
+  };
+  const std::string first = make("admin");
+  const std::string reader = make("read");
+  NewToken expired{"old", "admin", {}, "local", "2020-01-01T00:00:00.000Z"};
+  ASSERT_TRUE(api.jobs.store().tokens().create(expired));
+  api.principal = {"x", http::Scope::kAdmin, first};
+  http::Response refused = api.ask("DELETE", "/v1/tokens/" + first);
+  EXPECT_EQ(refused.status, 409);
+  EXPECT_THAT(refused.body, HasSubstr("urn:colony:problem:last-admin-token"));
+  EXPECT_THAT(refused.body, HasSubstr("colonyd token create"));
+  EXPECT_TRUE(api.tokens.is_alive(first, http::unix_time_ms()));
+  EXPECT_EQ(api.ask("DELETE", "/v1/tokens/" + reader).status, 204);
+  EXPECT_EQ(api.ask("DELETE", "/v1/tokens/made-up").status, 404);
+  const std::string second = make("admin");
+  EXPECT_EQ(api.ask("DELETE", "/v1/tokens/" + first).status, 204);
+  EXPECT_EQ(api.ask("DELETE", "/v1/tokens/" + second).status, 409);
+  api.principal = {};  // a server without tokens locks nobody out
+  EXPECT_EQ(api.ask("DELETE", "/v1/tokens/" + second).status, 204);
+}
+
+TEST(Tokens, WhatGivesWayIsLoggedAndUnknown) {
+  std::vector<std::string> lines;
+  api::ApiConfig config = ApiFixture::config();
+  config.jobs.log = [&lines](const std::string& line) { lines.push_back(line); };
+  ApiFixture api(config);
+  TokenStore& store = api.jobs.store().tokens();
+  const auto expired = [](std::size_t number, const char* at) {
+    NewToken token{"old", "read", {}, "local", at};
+    for (std::size_t i = 0; i < 4; ++i) token.secret_hash[i] = static_cast<std::uint8_t>(number >> (8 * i));
+    return token;
+  };
+  const auto oldest = store.create(expired(0, "2019-01-01T00:00:00.000Z"));
+  ASSERT_TRUE(oldest);
+  api.tokens.add({oldest->row.id, "old", http::Scope::kRead, oldest->row.secret_hash, 1});
+  std::vector<std::thread> threads;  // several at once share a commit
+  for (std::size_t part = 0; part < 9; ++part) {
+    threads.emplace_back([&, part] {
+      for (std::size_t i = 1 + part; i < kTokensMax; i += 9) EXPECT_TRUE(store.create(expired(i, "2020-01-01T00:00:00.000Z")));
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  ASSERT_EQ(store.list()->size(), kTokensMax);
+  EXPECT_EQ(api.tokens.expires_unix_ms(oldest->row.id), 1);
+  EXPECT_EQ(api.post("/v1/tokens", R"({"name": "x", "scope": "read", "expires_h": 1})").status, 201);
+  ASSERT_EQ(lines.size(), 1u);
+  EXPECT_THAT(lines[0], HasSubstr(oldest->row.id));
+  EXPECT_EQ(api.tokens.expires_unix_ms(oldest->row.id), 0) << "not known any more";
 }
 
 TEST(Tokens, WhoAsksIsWrittenDown) {
