@@ -20,6 +20,7 @@ packages=(
   libcli11-dev libcurl4-openssl-dev                          # client
   libgtest-dev libgmock-dev librapidcheck-dev libbenchmark-dev   # tests
   openssl nginx slowhttptest   # tests/system: certificates, a proxy in front, slow clients (nginx is not started, see below)
+  libij-java openjdk-17-jre-headless python3-tifffile   # tests/system: what biologists read OME-TIFF with (ImageJ without its window; 52 MB to fetch)
   clang-16 libclang-rt-16-dev libfuzzer-16-dev   # tests/fuzz (46 MB to fetch; clang-14 cannot compile the <ranges> of this libstdc++)
 )
 

@@ -67,9 +67,12 @@ void Canvas::text(CanvasPoint at, std::string_view ascii, Ink ink, Align align, 
   const int stroke = std::max(1, static_cast<int>(height_px / 7.0 + 0.5));
   const std::string copy(ascii);
   int below = 0;
-  const int width = cv::getTextSize(copy, kFont, scale, stroke, &below).width;
-  const int back = align == Align::kLeft ? 0 : align == Align::kCentre ? width / 2 : width;
-  cv::putText(all, copy, {(fixed(at.x) >> kShift) - back, fixed(at.y) >> kShift}, kFont, scale, colour(ink), stroke, cv::LINE_AA);
+  const cv::Size size = cv::getTextSize(copy, kFont, scale, stroke, &below);
+  const int back = align == Align::kLeft ? 0 : align == Align::kCentre ? size.width / 2 : size.width;
+  const cv::Point base{(fixed(at.x) >> kShift) - back, fixed(at.y) >> kShift};
+  cv::putText(all, copy, base, kFont, scale, colour(ink), stroke, cv::LINE_AA);
+  const auto of_result = [](int twice) { return static_cast<double>(twice) / kTwice; };
+  texts_.push_back({of_result(base.x), of_result(base.y - size.height), of_result(base.x + size.width), of_result(base.y + below), copy});
 }
 
 void Canvas::shade(std::int64_t row, std::int64_t column, Ink ink, double share) {
