@@ -12,7 +12,7 @@ namespace colony::server::api {
 namespace {
 
 constexpr double kPanelWidth_px = 740, kContourHeight_px = 620, kCountHeight_px = 560, kSlopeHeight_px = 250;
-constexpr double kLeft_px = 96, kBetween_px = 104, kRight_px = 28;
+constexpr double kLeft_px = 112, kBetween_px = 128, kRight_px = 28;
 constexpr double kTitle_px = 52, kRowGap_px = 60, kAxisText_px = 70, kBottom_px = 66;
 constexpr Ink kPictureFrame{0xc8, 0xc8, 0xc8};
 constexpr double kBar_px = 60.0;  // of a panel, for the scale bar

@@ -44,7 +44,7 @@ std::vector<double> ticks(double low, double high) {
 
 std::vector<double> slope_ticks(double low, double high) {
   std::vector<double> all;
-  const double step = high - low > 0.6 ? 0.2 : 0.1;
+  const double step = high - low > 2.0 ? 0.5 : high - low > 0.6 ? 0.2 : 0.1;
   for (int k = 0; k <= 30; ++k) {
     const double slope = step * k;
     if (slope >= low && slope <= high) all.push_back(slope);

@@ -43,7 +43,7 @@ double round_length(double most);
 /// 1, 2, 5, 10, ... within [low, high], rising; only powers of ten where it is long.
 std::vector<double> ticks(double low, double high);
 
-/// Multiples of 0.1 or, where it is long, 0.2 within [low, high], for slopes.
+/// Multiples of 0.1 or, where it is long, 0.2 or 0.5 within [low, high], for slopes; none beyond 30 of them from 0.
 std::vector<double> slope_ticks(double low, double high);
 
 /// Logarithmic both ways. `take` widens them to a curve.

@@ -58,6 +58,7 @@ TEST(Plot, TicksStandAtRoundValues) {
   EXPECT_THAT(api::ticks(0.4, 1.2), near({0.5, 1}));
   EXPECT_THAT(api::slope_ticks(0.95, 1.35), near({1.0, 1.1, 1.2, 1.3}));
   EXPECT_THAT(api::slope_ticks(0.9, 1.95), near({1.0, 1.2, 1.4, 1.6, 1.8}));
+  EXPECT_THAT(api::slope_ticks(-0.1, 2.3), near({0.0, 0.5, 1.0, 1.5, 2.0}));
   EXPECT_DOUBLE_EQ(api::round_length(123.0), 100.0);
   EXPECT_DOUBLE_EQ(api::round_length(99.0), 50.0);
   EXPECT_DOUBLE_EQ(api::round_length(0.0049), 0.002);
@@ -160,7 +161,8 @@ TEST(Figure, NoTextRunsIntoAnother) {
   }
   // As many boxes as the largest picture can have: numbers of seven digits on the axis.
   for (LineReport* lines : {&made->simulated.lines, &made->real.lines}) {
-    for (BoxCount& count : lines->walls.dimensions->counts) count.count_mean *= 4e6 / lines->walls.dimensions->counts.front().count_mean;
+    const double factor = 4e6 / lines->walls.dimensions->counts.front().count_mean;
+    for (BoxCount& count : lines->walls.dimensions->counts) count.count_mean *= factor;
   }
   expect_clear(api::comparison_canvas(*made));
   // And a line that has no fit over the common boxes.
