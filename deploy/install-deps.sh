@@ -82,6 +82,9 @@ if [[ " ${missing[*]} " == *" nginx "* ]] && [ ! -e "$policy" ]; then
   trap '"${as_root[@]}" rm -f "$policy"' EXIT
 fi
 
+# Images without manual pages lack the folder that Java's installation links into.
+if [[ " ${missing[*]} " == *" openjdk-17-jre-headless "* ]]; then "${as_root[@]}" mkdir -p /usr/share/man/man1; fi
+
 # A package list may be old or, on a fresh machine, empty.
 apt_get -q update
 apt_get -q -y install --no-install-recommends "${missing[@]}"
