@@ -20,6 +20,7 @@ packages=(
   libcli11-dev libcurl4-openssl-dev                          # client
   libgtest-dev libgmock-dev librapidcheck-dev libbenchmark-dev   # tests
   openssl nginx slowhttptest   # tests/system: certificates, a proxy in front, slow clients (nginx is not started, see below)
+  libij-java openjdk-17-jre-headless python3-tifffile   # tests/system: what biologists read OME-TIFF with (ImageJ without its window; 52 MB to fetch)
   clang-16 libclang-rt-16-dev libfuzzer-16-dev   # tests/fuzz (46 MB to fetch; clang-14 cannot compile the <ranges> of this libstdc++)
 )
 
@@ -80,6 +81,9 @@ if [[ " ${missing[*]} " == *" nginx "* ]] && [ ! -e "$policy" ]; then
   "${as_root[@]}" sh -c "printf '#!/bin/sh\nexit 101\n' >$policy && chmod +x $policy"
   trap '"${as_root[@]}" rm -f "$policy"' EXIT
 fi
+
+# Images without manual pages lack the folder that Java's installation links into.
+if [[ " ${missing[*]} " == *" openjdk-17-jre-headless "* ]]; then "${as_root[@]}" mkdir -p /usr/share/man/man1; fi
 
 # A package list may be old or, on a fresh machine, empty.
 apt_get -q update

@@ -21,6 +21,11 @@ struct CanvasPoint {
   double x = 0.0, y = 0.0;
 };
 enum class Align { kLeft, kCentre, kRight };
+/// Where a text stands, letters below the base line included.
+struct TextBox {
+  double left = 0.0, top = 0.0, right = 0.0, bottom = 0.0;
+  std::string text;
+};
 
 class Canvas {
  public:
@@ -33,12 +38,15 @@ class Canvas {
   void text(CanvasPoint at, std::string_view ascii, Ink ink, Align align = Align::kLeft, double height_px = 14.0);
   /// One pixel of the result, `share` of the way from what is there to `ink`.
   void shade(std::int64_t row, std::int64_t column, Ink ink, double share);
+  /// All texts so far: a layout can be held to letting none run into another.
+  const std::vector<TextBox>& texts() const { return texts_; }
   /// RGB, `name` and `text` empty.
   StepImage picture() const;
 
  private:
   std::int64_t width_px_, height_px_;
   std::vector<std::uint8_t> twice_;  // RGB at twice the sides
+  std::vector<TextBox> texts_;
 };
 
 }  // namespace colony

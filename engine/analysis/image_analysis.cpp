@@ -84,10 +84,12 @@ Result<ImageAnalysis> analyse_image(std::string_view bytes, const AnalysisOption
       !(*options.um_per_px >= kImageScaleMin_um_per_px && *options.um_per_px <= kImageScaleMax_um_per_px)) {
     return wrong("um_per_px", "must be between 0.001 and 10000");
   }
+  throw_if_stopped(stop);
   DecodeLimits limits = options.limits;
   limits.side_max_px = std::min(limits.side_max_px, kImageSideMax_px);
   Result<DecodedImage> decoded = decode_image(bytes, limits);
   if (!decoded) return decoded.error();
+  throw_if_stopped(stop);
   ImageAnalysis result;
   ImageMetadata& metadata = result.metadata;
   metadata.format = decoded->format;

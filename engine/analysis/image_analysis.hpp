@@ -59,7 +59,7 @@ Result<ImageAnalysis> analyse_image(std::string_view bytes, const AnalysisOption
 /// 0.1 % to their 99.9 % level, which `metadata` then names.
 Result<GreyImage> grey_of(const DecodedImage& image, std::optional<std::int64_t> channel, ImageMetadata& metadata);
 
-/// A step as an 8-bit PNG, grey or colour. The bytes are the same for one zlib.
-std::string encode_step_png(const StepImage& step);
+/// A step as an 8-bit PNG, grey or colour. The bytes are the same for one zlib. Throws Stopped when asked to, between rows: 32 Mpx take seconds.
+std::string encode_step_png(const StepImage& step, StopFlag stop = nullptr);
 
 }  // namespace colony

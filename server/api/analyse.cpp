@@ -251,7 +251,7 @@ Result<std::string> step_png(std::string_view bytes, const ImageOptions& options
   const auto analysis = analyse_image(bytes, wanted, effort.stop);
   if (!analysis) return analysis.error();
   for (const StepImage& step : analysis->segmentation.steps) {
-    if (step.name == name) return encode_step_png(step);
+    if (step.name == name) return encode_step_png(step, effort.stop);
   }
   return Error{ErrorCode::kNotFound, "this analysis has no step '" + name + "'; its result names those there are"};
 }

@@ -6,6 +6,7 @@
 #include "server/api/docs.hpp"
 #include "server/api/feed.hpp"
 #include "server/api/job_texts.hpp"
+#include "server/api/kept.hpp"
 #include "server/api/openapi.hpp"
 #include "server/api/pages.hpp"
 #include "server/api/schema.hpp"
@@ -89,6 +90,7 @@ Api::Api(JobService& jobs, http::TokenTable& tokens, ApiConfig config) {
   context_->job_texts = std::make_shared<JobTexts>(jobs, context_->config.base_path);
   context_->pages = std::make_shared<Pages>(jobs, context_->config.base_path);
   context_->feeds = std::make_shared<Feeds>(jobs);
+  context_->kept = std::make_shared<KeptAnswers>(kKeptBytesMax);
   context_->schema_text = to_text(job_spec_schema(limits));
   const Json openapi = openapi_document(endpoints(), limits, context_->config.version, context_->config.base_path);
   context_->openapi_text = to_text(openapi);

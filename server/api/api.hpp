@@ -69,6 +69,7 @@ inline constexpr std::uint64_t kFoundersPlacedFreely = 1000;
 class Pages;
 class Feeds;
 class JobTexts;
+class KeptAnswers;
 
 /// What handlers work with.
 struct Context {
@@ -87,6 +88,7 @@ struct Context {
   std::atomic<std::size_t> waiting{0};  // requests that wait for a job to change
   std::string docs_text = {};           // the page of /docs, made once
   std::mutex tokens_mutex = {};  // a change of the stored tokens and of `tokens` is one
+  std::shared_ptr<KeptAnswers> kept = {};  // steps and figures made last
 };
 
 /// A request that has passed the table's checks.

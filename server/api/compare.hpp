@@ -9,6 +9,7 @@
 // Threads: pure. Throws Stopped.
 #pragma once
 
+#include "engine/analysis/canvas.hpp"
 #include "server/api/analyse.hpp"
 #include "server/api/measure.hpp"
 
@@ -77,5 +78,7 @@ Result<double> matched_scale(const Colony& colony, const Match& match, const Eff
 
 /// PNG: both contours above in one scale, below log-log plots with fitted lines, and the slopes from small to large boxes.
 std::string comparison_figure(const Comparison& comparison);
+/// The same before it is a file.
+Canvas comparison_canvas(const Comparison& comparison);
 
 }  // namespace colony::server::api

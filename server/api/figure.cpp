@@ -1,44 +1,21 @@
 // The figure of a comparison, like figures 1 and 2 of the paper, the simulated colony on the left and the real one on the right: what was counted, in
 // one scale; box counts with the fitted lines; slopes from small to large boxes, which a line hides.
 #include <algorithm>
-#include <cmath>
-#include <cstdio>
 #include <string>
 
-#include "engine/analysis/canvas.hpp"
 #include "engine/analysis/contour.hpp"
 #include "engine/base/check.hpp"
 #include "server/api/compare.hpp"
+#include "server/api/plot.hpp"
 
 namespace colony::server::api {
 namespace {
 
 constexpr double kPanelWidth_px = 740, kContourHeight_px = 620, kCountHeight_px = 560, kSlopeHeight_px = 250;
-constexpr double kLeft_px = 96, kBetween_px = 104, kRight_px = 28;
-constexpr double kTitle_px = 52, kRowGap_px = 60, kAxisText_px = 70, kLegendRow_px = 26, kBottom_px = 66;
-constexpr Ink kBlack{0, 0, 0}, kAxis{0x40, 0x40, 0x40}, kGrid{0xe6, 0xe6, 0xe6}, kBand{0xf1, 0xf4, 0xf9}, kPictureFrame{0xc8, 0xc8, 0xc8};
+constexpr double kLeft_px = 112, kBetween_px = 128, kRight_px = 28;
+constexpr double kTitle_px = 52, kRowGap_px = 60, kAxisText_px = 70, kBottom_px = 66;
+constexpr Ink kPictureFrame{0xc8, 0xc8, 0xc8};
 constexpr double kBar_px = 60.0;  // of a panel, for the scale bar
-constexpr Ink kOutlineInk{0x1f, 0x77, 0xb4};
-
-struct Panel {
-  double x = 0.0, y = 0.0, width = kPanelWidth_px, height = 0.0;
-};
-
-/// A line that was counted: all its boxes, and the fit over those that are compared.
-struct Curve {
-  std::string name;
-  const MeasuredLine* all = nullptr;
-  const MeasuredLine* compared = nullptr;
-  Ink ink;
-  bool is_control = false;
-};
-
-template <class... Values>
-std::string format(const char* form, Values... values) {
-  char text[160];
-  std::snprintf(text, sizeof text, form, values...);
-  return text;
-}
 
 // --- what was counted ---
 
@@ -101,172 +78,13 @@ void draw_ink(Canvas& canvas, const Panel& panel, const Drawing& drawing, const 
   }
 }
 
-/// 1, 2 or 5 times a power of ten, at most `most`.
-double round_length(double most) {
-  double best = 1e-9;
-  for (double decade = 1e-6; decade < 1e9; decade *= 10.0) {
-    for (const double digit : {1.0, 2.0, 5.0}) best = digit * decade <= most ? digit * decade : best;
-  }
-  return best;
-}
-
 void draw_bar(Canvas& canvas, const Panel& panel, double step, std::optional<double> um_per_px) {
   const double most = 0.3 * panel.width * step;  // in px of the image
   const double length_px = um_per_px ? round_length(most * *um_per_px) / *um_per_px : round_length(most);
   const std::string text = um_per_px ? format("%.4g um (%.0f px)", length_px * *um_per_px, length_px) : format("%.4g px", length_px);
   const double y = panel.y + panel.height - 30.0, x = panel.x + 20.0;
-  canvas.box({x, y - 3.0}, length_px / step, 6.0, kBlack, true);
-  canvas.text({x + length_px / step + 14.0, y + 6.0}, text, kBlack);
-}
-
-// --- plots ---
-
-struct Axes {
-  double x_low = 1e300, x_high = 0.0, y_low = 1e300, y_high = 0.0;
-
-  void take(const Curve& curve) {
-    for (const BoxCount& count : curve.all->dimensions->counts) {
-      const auto side = static_cast<double>(count.side_px);
-      x_low = std::min(x_low, side);
-      x_high = std::max(x_high, side);
-      y_low = std::min(y_low, count.count_mean);
-      y_high = std::max(y_high, count.count_mean);
-    }
-  }
-  double x(const Panel& panel, double side) const { return panel.x + std::log(side / x_low) / std::log(x_high / x_low) * panel.width; }
-  double y(const Panel& panel, double count) const {
-    return panel.y + panel.height - std::log(count / y_low) / std::log(y_high / y_low) * panel.height;
-  }
-};
-
-/// 1, 2, 5, 10, ... within the axis; only powers of ten where it is long.
-std::vector<double> ticks(double low, double high) {
-  std::vector<double> all;
-  const bool is_long = high / low > 2000.0;
-  for (double decade = 1e-3; decade <= high; decade *= 10.0) {
-    for (const double digit : {1.0, 2.0, 5.0}) {
-      const double value = digit * decade;
-      if (value >= low && value <= high && (digit == 1.0 || !is_long)) all.push_back(value);
-    }
-  }
-  return all;
-}
-
-void draw_frame(Canvas& canvas, const Panel& panel) { canvas.box({panel.x, panel.y}, panel.width, panel.height, kAxis, false); }
-
-/// The range that is compared, as a band, and the ticks of the box sides.
-void draw_sides(Canvas& canvas, const Panel& panel, const Axes& axes, const Curve* compared) {
-  if (compared != nullptr) {
-    const BoxDimensions& found = *compared->compared->dimensions;
-    const double from = axes.x(panel, static_cast<double>(found.side_min_px)), to = axes.x(panel, static_cast<double>(found.side_max_px));
-    canvas.box({from, panel.y}, to - from, panel.height, kBand, true);
-  }
-  for (const double side : ticks(axes.x_low, axes.x_high)) {
-    const double x = axes.x(panel, side);
-    canvas.line({x, panel.y}, {x, panel.y + panel.height}, kGrid);
-    canvas.text({x, panel.y + panel.height + 24.0}, format("%.0f", side), kAxis, Align::kCentre);
-  }
-}
-
-void draw_counts(Canvas& canvas, const Panel& panel, const Axes& axes, const std::vector<Curve>& curves) {
-  const auto with_fit = std::find_if(curves.begin(), curves.end(), [](const Curve& c) { return !c.is_control && c.compared->dimensions; });
-  draw_sides(canvas, panel, axes, with_fit == curves.end() ? nullptr : &*with_fit);
-  for (const double count : ticks(axes.y_low, axes.y_high)) {
-    const double y = axes.y(panel, count);
-    canvas.line({panel.x, y}, {panel.x + panel.width, y}, kGrid);
-    canvas.text({panel.x - 10.0, y + 6.0}, format("%.0f", count), kAxis, Align::kRight);
-  }
-  canvas.text({panel.x + panel.width, panel.y + panel.height + 50.0}, "box side s, px", kAxis, Align::kRight);
-  // Controls first: the lines in question lie over them.
-  for (const bool is_control : {true, false}) {
-    for (const Curve& curve : curves) {
-      if (curve.is_control != is_control) continue;
-      std::vector<CanvasPoint> points;
-      for (const BoxCount& count : curve.all->dimensions->counts) {
-        points.push_back({axes.x(panel, static_cast<double>(count.side_px)), axes.y(panel, count.count_mean)});
-      }
-      if (is_control) {
-        canvas.lines(points, curve.ink, 1.5);
-        continue;
-      }
-      if (!curve.compared->dimensions) {
-        for (const CanvasPoint& point : points) canvas.dot(point, 4.5, curve.ink, false);
-        continue;
-      }
-      const BoxDimensions& fit = *curve.compared->dimensions;
-      double mean_x = 0.0, mean_y = 0.0;  // least squares pass through the means
-      for (const BoxCount& count : fit.counts) {
-        mean_x += std::log(static_cast<double>(count.side_px)) / static_cast<double>(fit.counts.size());
-        mean_y += std::log(count.count_mean) / static_cast<double>(fit.counts.size());
-      }
-      const auto on_line = [&](std::int64_t side) {
-        const double x = std::log(static_cast<double>(side));
-        return CanvasPoint{axes.x(panel, static_cast<double>(side)), axes.y(panel, std::exp(mean_y - fit.capacity.value * (x - mean_x)))};
-      };
-      canvas.line(on_line(fit.side_min_px), on_line(fit.side_max_px), curve.ink, 1.5);
-      for (std::size_t i = 0; i < points.size(); ++i) canvas.dot(points[i], 4.5, curve.ink, i < fit.counts.size());
-    }
-  }
-  draw_frame(canvas, panel);
-}
-
-/// Below the plot, since its curves may run anywhere in it.
-void draw_legend(Canvas& canvas, const Panel& panel, const std::vector<Curve>& curves) {
-  double y = panel.y + 16.0;
-  const double text_x = panel.x + 52.0, value_x = panel.x + 330.0;
-  const BoxDimensions* fitted = nullptr;
-  for (const Curve& curve : curves) {
-    canvas.line({panel.x, y - 5.0}, {panel.x + 38.0, y - 5.0}, curve.ink, curve.is_control ? 1.5 : 2.0);
-    if (!curve.is_control) canvas.dot({panel.x + 19.0, y - 5.0}, 4.5, curve.ink, true);
-    canvas.text({text_x, y}, curve.name, kBlack);
-    if (curve.compared->dimensions) {
-      const Dimension& d0 = curve.compared->dimensions->capacity;
-      canvas.text({value_x, y}, format("D0 %.3f +- %.3f, r2 %.3f", d0.value, d0.standard_error, d0.r2), kBlack);
-      if (!curve.is_control && fitted == nullptr) fitted = &*curve.compared->dimensions;
-    } else {
-      canvas.text({value_x, y}, "too few box sides in common", kBlack);
-    }
-    y += kLegendRow_px;
-  }
-  if (fitted == nullptr) return;
-  canvas.text({text_x, y}, format("D0 = -slope, fitted for boxes of %.0f to %.0f px (shaded)", static_cast<double>(fitted->side_min_px),
-                                  static_cast<double>(fitted->side_max_px)), kAxis);
-}
-
-struct SlopeRange {
-  double low = 0.95, high = 1.05;
-  void take(const Curve& curve) {
-    for (const LocalSlope& slope : windowed_slopes(*curve.all->dimensions)) {
-      low = std::min(low, slope.dimension - 0.05);
-      high = std::max(high, slope.dimension + 0.05);
-    }
-  }
-};
-
-void draw_slopes(Canvas& canvas, const Panel& panel, const Axes& axes, const SlopeRange& range, const std::vector<Curve>& curves) {
-  const auto with_fit = std::find_if(curves.begin(), curves.end(), [](const Curve& c) { return !c.is_control && c.compared->dimensions; });
-  draw_sides(canvas, panel, axes, with_fit == curves.end() ? nullptr : &*with_fit);
-  const auto y_of = [&](double slope) { return panel.y + panel.height - (slope - range.low) / (range.high - range.low) * panel.height; };
-  const double step = range.high - range.low > 0.6 ? 0.2 : 0.1;
-  for (int k = 0; k <= 30; ++k) {
-    const double slope = step * k;
-    if (slope < range.low || slope > range.high) continue;
-    canvas.line({panel.x, y_of(slope)}, {panel.x + panel.width, y_of(slope)}, kGrid);
-    canvas.text({panel.x - 10.0, y_of(slope) + 6.0}, format("%.1f", slope), kAxis, Align::kRight);
-  }
-  canvas.text({panel.x + panel.width, panel.y + panel.height + 50.0}, "box side s, px", kAxis, Align::kRight);
-  for (const bool is_control : {true, false}) {
-    for (const Curve& curve : curves) {
-      if (curve.is_control != is_control) continue;
-      std::vector<CanvasPoint> points;
-      for (const LocalSlope& slope : windowed_slopes(*curve.all->dimensions)) points.push_back({axes.x(panel, slope.side_px), y_of(slope.dimension)});
-      canvas.lines(points, curve.ink, is_control ? 1.5 : 2.0);
-      for (const CanvasPoint& point : points) {
-        if (!is_control) canvas.dot(point, 3.5, curve.ink, true);
-      }
-    }
-  }
-  draw_frame(canvas, panel);
+  canvas.box({x, y - 3.0}, length_px / step, 6.0, kBlackInk, true);
+  canvas.text({x + length_px / step + 14.0, y + 6.0}, text, kBlackInk);
 }
 
 /// Of single things the outer outline is that of each, and would only hide the other line.
@@ -278,7 +96,7 @@ std::vector<Curve> curves_of(const LineReport& all, const std::vector<ControlRep
   const auto add = [&](const std::string& name, const MeasuredLine& line, const MeasuredLine& compared, Ink ink, bool is_control) {
     if (line.dimensions) curves.push_back({name, &line, &compared, ink, is_control});
   };
-  add(names.walls, all.walls, side.lines.walls, kBlack, false);
+  add(names.walls, all.walls, side.lines.walls, kBlackInk, false);
   if (has_outline(kind)) add(names.outline, all.outline, side.lines.outline, kOutlineInk, false);
   for (std::size_t i = 0; i < controls.size(); ++i) {
     const std::string& name = controls[i].name;
@@ -295,7 +113,7 @@ std::string counted(const char* letter, const char* whose, std::uint64_t count, 
 
 }  // namespace
 
-std::string comparison_figure(const Comparison& comparison) {
+Canvas comparison_canvas(const Comparison& comparison) {
   const auto walls = cell_walls(comparison.image.labels), outline = colony_outline(comparison.image.labels);
   CHECK(walls && outline);  // they were measured
   // Of the colony what is drawn; of the picture all of its frame, which cuts things.
@@ -332,22 +150,24 @@ std::string comparison_figure(const Comparison& comparison) {
                 is_simulated ? counted("a", "simulated", comparison.simulated.cell_count, comparison.match.simulated) +
                                    format(", %.0f h", comparison.at.time_h)
                              : counted("b", "real", comparison.real.object_count, comparison.real.objects),
-                kBlack, Align::kLeft, 16.0);
+                kBlackInk, Align::kLeft, 16.0);
     if (!is_simulated) draw_picture_frame(canvas, contours, drawings[i], step);
-    draw_ink(canvas, contours, drawings[i], *drawings[i].walls, step, kBlack);
+    draw_ink(canvas, contours, drawings[i], *drawings[i].walls, step, kBlackInk);
     if (has_outline(is_simulated ? comparison.match.simulated : comparison.real.objects)) {
       draw_ink(canvas, contours, drawings[i], *drawings[i].outline, step, kOutlineInk);
     }
     draw_bar(canvas, contours, step, is_simulated ? std::optional(comparison.um_per_px) : comparison.real.analysis.um_per_px);
     draw_frame(canvas, contours);
-    canvas.text({x, count_y - 16.0}, std::string(is_simulated ? "(c)" : "(d)") + " boxes met, N(s)", kBlack, Align::kLeft, 16.0);
+    canvas.text({x, count_y - 16.0}, std::string(is_simulated ? "(c)" : "(d)") + " boxes met, N(s)", kBlackInk, Align::kLeft, 16.0);
     draw_counts(canvas, counts, axes, curves[i]);
     draw_legend(canvas, {x, legend_y, kPanelWidth_px, 0.0}, curves[i]);
-    canvas.text({x, slope_y - 16.0}, std::string(is_simulated ? "(e)" : "(f)") + " slope of N(s) through " + std::to_string(kSlopeWindow) + " sides", kBlack,
+    canvas.text({x, slope_y - 16.0}, std::string(is_simulated ? "(e)" : "(f)") + " slope of N(s) through " + std::to_string(kSlopeWindow) + " sides", kBlackInk,
                 Align::kLeft, 16.0);
     draw_slopes(canvas, course, axes, slopes, curves[i]);
   }
-  return encode_step_png(canvas.picture());
+  return canvas;
 }
+
+std::string comparison_figure(const Comparison& comparison) { return encode_step_png(comparison_canvas(comparison).picture()); }
 
 }  // namespace colony::server::api

@@ -7,6 +7,7 @@
 #include "server/api/api.hpp"
 #include "server/api/codec_analysis.hpp"
 #include "server/api/codec_event.hpp"
+#include "server/api/kept.hpp"
 #include "server/api/shape_table.hpp"
 
 namespace colony::server::api {
@@ -184,6 +185,7 @@ http::Response get_analysis_objects(Context& context, const Call& call) {
   // An analysis has one image and one set of options for ever.
   const std::string tag = derived_tag(context, call, Digest{}, 0, row->id + " " + row->options_json);
   if (auto settled = settled_by_tag(call, tag)) return std::move(*settled);
+  if (auto kept = context.kept->find(tag)) return std::move(*kept);
   const auto image = store.image(call.id());
   if (!image) return failure(image.error(), call);
   const auto objects = objects_of_picture(*image, decode_image_options(row->options_json), effort_of(context, call));
@@ -199,6 +201,7 @@ http::Response get_analysis_objects(Context& context, const Call& call) {
     response = json_response(200, {{"items", std::move(items)}, {"next", nullptr}});
   }
   stamp(response, tag);
+  context.kept->keep(tag, response);
   return response;
 }
 
@@ -225,6 +228,7 @@ http::Response get_analysis_step(Context& context, const Call& call) {
   // An analysis has one image and one set of options for ever.
   const std::string tag = derived_tag(context, call, Digest{}, 0, row->id + " " + row->options_json + " " + wanted);
   if (auto settled = settled_by_tag(call, tag)) return std::move(*settled);
+  if (auto kept = context.kept->find(tag)) return std::move(*kept);
   const auto image = store.image(call.id());
   if (!image) return failure(image.error(), call);
   auto png = step_png(*image, decode_image_options(row->options_json), wanted, effort_of(context, call));
@@ -233,6 +237,7 @@ http::Response get_analysis_step(Context& context, const Call& call) {
   response.headers.set("Content-Type", call.media);
   response.body = std::move(*png);
   stamp(response, tag);
+  context.kept->keep(tag, response);
   return response;
 }
 

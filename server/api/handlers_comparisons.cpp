@@ -4,6 +4,7 @@
 #include "server/api/api.hpp"
 #include "server/api/codec_analysis.hpp"
 #include "server/api/compare.hpp"
+#include "server/api/kept.hpp"
 
 namespace colony::server::api {
 namespace {
@@ -135,12 +136,14 @@ http::Response get_comparison_figure(Context& context, const Call& call) {
   if (!moment) return failure(moment.error(), call);
   const std::string tag = derived_tag(context, call, moment->digest, moment->seq, row->id + " " + source->options_json);
   if (auto settled = settled_by_tag(call, tag)) return std::move(*settled);
+  if (auto kept = context.kept->find(tag)) return std::move(*kept);
   const auto comparison = compare_again(context, *row, effort_of(context, call), Sweep::kLeaveOut);
   if (!comparison) return failure(comparison.error(), call);
   http::Response response;
   response.headers.set("Content-Type", call.media);
   response.body = comparison_figure(*comparison);
   stamp(response, tag);
+  context.kept->keep(tag, response);
   return response;
 }
 

@@ -139,10 +139,17 @@ TEST(Comparisons, RefuseWhatIsWrong) {
   EXPECT_EQ(wrong.status, 422);
   EXPECT_THAT(faults(wrong), ElementsAre("/at_h", "/colour", "/analysis_id"));
   auto nobody = fixture.post("/v1/comparisons", R"({"job_id":"x","analysis_id":"y"})");
+  EXPECT_EQ(nobody.status, 422) << "the resource is there, what it names is not";
   EXPECT_THAT(faults(nobody), ElementsAre("/analysis_id"));
   auto no_job = fixture.post("/v1/comparisons",
                              api::to_text({{"job_id", "x"}, {"analysis_id", analysis["id"]}}));
+  EXPECT_EQ(no_job.status, 422);
   EXPECT_THAT(faults(no_job), ElementsAre("/job_id"));
+  auto too_early = fixture.post("/v1/comparisons", api::to_text({{"job_id", kJobId}, {"analysis_id", analysis["id"]}, {"at_h", 9e6}}));
+  EXPECT_EQ(too_early.status, 409) << too_early.body;
+  EXPECT_THAT(faults(too_early), ElementsAre("/at_h"));
+  auto list = fixture.get("/v1/comparisons");
+  EXPECT_EQ(json_of(list)["items"].size(), 0u) << "nothing was stored";
 }
 
 TEST(Comparisons, OfALargeColonyPictureAreWorkedOnLaterThoughThePhotographIsSmall) {
