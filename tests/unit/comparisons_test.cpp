@@ -66,8 +66,9 @@ TEST(Comparisons, MatchNucleiWithNucleiAndSayWhatWasMatched) {
   auto left = fixture.get(made["links"]["self"].get<std::string>());
   EXPECT_TRUE(json_of(left)["links"]["figure"].is_null()) << left.body;
   auto list = fixture.get("/v1/comparisons?limit=5");
-  ASSERT_EQ(json_of(list)["items"].size(), 3u);
-  for (const Json& shown : json_of(list)["items"]) EXPECT_TRUE(shown["links"]["figure"].is_null());
+  const Json items = json_of(list)["items"];  // named: a loop does not keep what it calls [] on
+  ASSERT_EQ(items.size(), 3u);
+  for (const Json& shown : items) EXPECT_TRUE(shown["links"]["figure"].is_null());
 }
 
 TEST(Comparisons, WarnWhereAnObjectIsNotKnownToBeACell) {
