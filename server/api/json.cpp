@@ -160,6 +160,10 @@ Result<Json> parse_json(std::string_view text) {
   if (text.starts_with("\xEF\xBB\xBF")) {
     return Error{ErrorCode::kMalformed, "malformed JSON at byte offset 0: a byte order mark is not part of JSON"};
   }
+  // The library takes this byte for the end of the text, and what follows it would not be looked at.
+  if (const std::size_t nul = text.find('\0'); nul != std::string_view::npos) {
+    return Error{ErrorCode::kMalformed, "malformed JSON at byte offset " + std::to_string(nul) + ": a zero byte"};
+  }
   std::size_t read = 0;
   Builder builder(read);
   const CountingIterator begin(text.data(), &read);

@@ -1,6 +1,6 @@
 // spec_fuzz: a request body as a job spec: bytes, strict JSON, spec, normal form.
-// Promise checked: JSON that is read has one reading (its text reads as itself); an error names places; an accepted spec is written in a
-//                  normal form that is accepted, as submitted and as stored, and is its own normal form.
+// Promise checked: JSON that is read was read to its end, and has one reading (its text reads as itself); an error names places; an
+//                  accepted spec is written in a normal form that is accepted, as submitted and as stored, and is its own normal form.
 #include <cstdlib>
 #include <string>
 #include <string_view>
@@ -34,6 +34,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     check_error(json.error());
     return 0;
   }
+  require(!parse_json(std::string(text) + " x"));  // all of it was read
   const std::string written = to_text(*json);
   const auto again = parse_json(written);
   require(again && to_text(*again) == written);

@@ -15,6 +15,7 @@ const bodies = [
   ['malformed JSON', '{"preset": "paper", "until": }', [400], /\b\d+\b/],
   ['JSON cut short', '{"preset": "paper"', [400], /\b\d+\b/],
   ['text after the JSON', `${spec({})} x`, [400], /\b\d+\b/],
+  ['a zero byte after the JSON', `${spec({})}\0 x`, [400], /zero byte/],
   ['NaN', '{"preset": "paper", "until": {"time_h": NaN}}', [400], /\b\d+\b/],
   ['Infinity', '{"preset": "paper", "until": {"time_h": Infinity}}', [400], /\b\d+\b/],
   ['a comment', '{"preset": "paper", /* c */ "until": {"cells": 10}}', [400]],

@@ -40,6 +40,9 @@ TEST(StrictJson, RefusesEveryOtherReadingWithTheByteOffset) {
       {R"({"b": [{"a": 1, "a": 2}]})", "twice", "/b/0/a"},
       {R"({"a": "x\u0000y"})", "U+0000", "/a"},
       {R"({"a\u0000": 1})", "U+0000"},
+      {std::string("{}\0", 3), "offset 2: a zero byte"},
+      {std::string("{}\0 not looked at", 17), "offset 2: a zero byte"},
+      {std::string("{\"a\": \0}", 8), "offset 6: a zero byte"},
   };
   for (const Malformed& one : cases) {
     const auto result = parse_json(one.text);
