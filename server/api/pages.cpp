@@ -179,6 +179,7 @@ std::shared_ptr<const std::string> Pages::progress_of(std::int64_t job_key, cons
   std::uint64_t stamp = 0;
   {
     const std::lock_guard lock(mutex_);
+    if (progress_.size() >= kPageTextsMax && !progress_.contains(job_key)) progress_.clear();
     KeptProgress& kept = progress_[job_key];
     if (kept.stamp == 0) kept.stamp = ++stamp_;
     if (kept.text && kept.made_at == kept.stamp && kept.state == state) return kept.text;

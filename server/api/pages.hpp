@@ -4,7 +4,7 @@
 //          ask at the same moment).
 // Method:  one subscription to all jobs, on the thread that announces: it notes keys and does nothing else. A thread of its own (`pages`)
 //          tells the pages, which wakes each: a thousand wakes are milliseconds that the writer of the store must not spend.
-// Limits:  kPageTextsMax texts of jobs of at most kPageTextBytesMax; when there is no room all are forgotten. kNewsMax keys between two
+// Limits:  kPageTextsMax texts of jobs of at most kPageTextBytesMax, and as many of progress; when there is no room all are forgotten. kNewsMax keys between two
 //          tellings, beyond that the pages are told to begin again.
 // Threads: synchronises itself. The functions of subscribers run on the thread `pages`.
 #pragma once
