@@ -1,10 +1,20 @@
 #include "server/log_sink.hpp"
 
 #include <cerrno>
+#include <poll.h>
 #include <unistd.h>
 #include <utility>
 
 namespace colony::server {
+namespace {
+
+std::size_t text_size(const std::deque<std::string>& lines) {
+  std::size_t size = 0;
+  for (const std::string& line : lines) size += line.size();
+  return size;
+}
+
+}  // namespace
 
 LogSink::LogSink(int descriptor, std::size_t lines_max, TellLost tell_lost)
     : descriptor_(descriptor), lines_max_(lines_max), tell_lost_(std::move(tell_lost)), thread_([this] { run(); }) {}
@@ -20,6 +30,12 @@ std::string LogSink::formatted(const spdlog::details::log_msg& message) {
   return {text.data(), text.size()};
 }
 
+void LogSink::tell_of_lost(spdlog::string_view_t logger_name) {
+  if (std::exchange(told_count_, lost_count_) == lost_count_) return;
+  const std::string told = tell_lost_(lost_count_);
+  lines_.push_back(formatted({logger_name, spdlog::level::warn, told}));
+}
+
 void LogSink::sink_it_(const spdlog::details::log_msg& message) {
   std::string line = formatted(message);
   bool is_to_wake = false;
@@ -29,9 +45,8 @@ void LogSink::sink_it_(const spdlog::details::log_msg& message) {
     if (lines_.size() >= lines_max_) {
       lines_.pop_front();
       ++lost_count_;
-    } else if (const std::size_t lost = std::exchange(lost_count_, 0); lost > 0) {
-      const std::string told = tell_lost_(lost);
-      lines_.push_back(formatted({message.logger_name, spdlog::level::warn, told}));
+    } else {
+      tell_of_lost(message.logger_name);
     }
     lines_.push_back(std::move(line));
     is_to_wake = std::exchange(is_waiting_, false);
@@ -40,37 +55,53 @@ void LogSink::sink_it_(const spdlog::details::log_msg& message) {
 }
 
 void LogSink::run() {
+  bool is_torn = false;  // the last line written lacks its end
   std::unique_lock lock(lines_mutex_);
   for (;;) {
     is_waiting_ = true;
     arrived_.wait(lock, [&] { return !lines_.empty() || is_ending_; });
     is_waiting_ = false;
     if (lines_.empty()) break;
-    std::string bytes;
-    for (const std::string& line : lines_) bytes += line;
-    lines_.clear();
+    const std::deque<std::string> taken = std::exchange(lines_, {});
     lock.unlock();
-    const bool is_written = write_all(bytes);
+    std::string bytes = is_torn ? "\n" : "";
+    for (const std::string& line : taken) bytes += line;
+    std::size_t written = write_all(bytes);
+    is_torn = written > 0 ? bytes[written - 1] != '\n' : is_torn;
+    std::size_t whole = 0;  // of taken
+    for (std::size_t end = bytes.size() - text_size(taken); whole < taken.size(); ++whole) {
+      end += taken[whole].size();
+      if (end > written) break;
+    }
     lock.lock();
-    if (!is_written) lines_.clear();  // nobody is there
+    lost_count_ += taken.size() - whole;
     arrived_.wait_for(lock, kGather, [&] { return is_ending_; });
   }
   has_ended_ = true;
   ended_.notify_all();
 }
 
-// False: the other end is gone.
-bool LogSink::write_all(std::string_view bytes) const {
-  while (!bytes.empty()) {
-    const ssize_t written = ::write(descriptor_, bytes.data(), bytes.size());
-    if (written < 0 && errno != EINTR) return false;
-    if (written > 0) bytes.remove_prefix(static_cast<std::size_t>(written));
+std::size_t LogSink::write_all(std::string_view bytes) const {
+  std::size_t written = 0;
+  while (written < bytes.size()) {
+    const ssize_t now = ::write(descriptor_, bytes.data() + written, bytes.size() - written);
+    if (now > 0) {
+      written += static_cast<std::size_t>(now);
+    } else if (now < 0 && errno == EAGAIN) {
+      // Somebody who shares the descriptor made it non-blocking.
+      pollfd ready{descriptor_, POLLOUT, 0};
+      if (::poll(&ready, 1, -1) < 0 && errno != EINTR) break;
+    } else if (now < 0 && errno != EINTR) {
+      break;
+    }
   }
-  return true;
+  return written;
 }
 
 bool LogSink::end(std::chrono::milliseconds patience) {
+  const std::lock_guard format_lock(mutex_);
   std::unique_lock lock(lines_mutex_);
+  if (!is_ending_) tell_of_lost("");
   is_ending_ = true;
   arrived_.notify_all();
   return ended_.wait_for(lock, patience, [&] { return has_ended_; });

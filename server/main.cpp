@@ -1,5 +1,6 @@
 // colonyd: wires store, jobs, api and http together, and ends them in the opposite order.
 // Exit: 0 after SIGTERM or SIGINT; 1 if it cannot start (data locked, port taken); 2 if the configuration is wrong.
+#include <fcntl.h>
 #include <sched.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -59,6 +60,15 @@ std::string text_of(const Error& error, const char* separator) {
   std::string text = error.message;
   for (const FieldError& field : error.fields) text += separator + field.pointer + ": " + field.message;
   return text;
+}
+
+// A file opened while one of them is closed would get its number, and then what is said to it.
+void open_standard_descriptors() {
+  for (const int descriptor : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (fcntl(descriptor, F_GETFD) >= 0) continue;
+    const int null = open("/dev/null", O_RDWR);  // the lowest number that is free: this one
+    if (null >= 0 && null != descriptor) close(null);
+  }
 }
 
 // Blocked in every thread (those made later inherit it) and fetched by wait_for_signal: no code of ours runs in a
@@ -194,6 +204,7 @@ void set_logger(std::shared_ptr<spdlog::logger> logger) {
 }
 
 int run(int argc, char** argv) {
+  open_standard_descriptors();
   set_logger(spdlog::stderr_logger_mt("colonyd"));
   const auto invocation = configure(std::vector<std::string>(argv + 1, argv + argc), environment(), COLONY_VERSION,
                                     usable_cores());
@@ -208,7 +219,7 @@ int run(int argc, char** argv) {
   if (invocation->token) return run_token_create(invocation->config, *invocation->token);
   const sigset_t signals = block_signals();  // before any thread
   const auto tell_lost = [format = invocation->config.log_format](std::size_t lines) {
-    const std::string told = std::to_string(lines) + " lines of the log are lost: nobody took them";
+    const std::string told = std::to_string(lines) + " lines of the log are lost since the start: nobody took them";
     return log_event(format, wall_time_text(), "warning", told).text;
   };
   const auto lines = std::make_shared<LogSink>(STDERR_FILENO, kLogLinesMax, tell_lost);

@@ -3,13 +3,17 @@
 
 #include <algorithm>
 #include <csignal>
+#include <cstdio>
 #include <fcntl.h>
+#include <fstream>
+#include <iterator>
 #include <memory>
 #include <sstream>
 #include <string>
 #include <unistd.h>
 #include <vector>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <spdlog/logger.h>
 
@@ -95,9 +99,10 @@ TEST(LogSink, WhoDoesNotReadHoldsNobody) {
   Logged log(kWaiting);
   stall(log);
   EXPECT_FALSE(log.sink->end(milliseconds(0)));
-  // What waits is written all the same, once somebody reads.
-  const auto lines = log.pipe.lines(1 + kWaiting);
-  ASSERT_EQ(lines.size(), 1 + kWaiting);
+  // What waits is written all the same, once somebody reads, and what was lost is told.
+  const auto lines = log.pipe.lines(1 + kWaiting + 1);
+  ASSERT_EQ(lines.size(), 1 + kWaiting + 1);
+  EXPECT_EQ(lines.back(), "lost " + std::to_string(kSmall - kWaiting));
   for (std::size_t i = 0; i < kWaiting; ++i) EXPECT_EQ(lines[1 + i], std::to_string(kSmall - kWaiting + i));
   EXPECT_TRUE(log.sink->end(kLong));
 }
@@ -111,6 +116,45 @@ TEST(LogSink, TheNextLineTakenSaysHowManyWereLost) {
   ASSERT_EQ(lines.size(), 1 + kWaiting + 2);
   EXPECT_EQ(lines[1 + kWaiting], "lost " + std::to_string(kSmall - kWaiting));
   EXPECT_EQ(lines.back(), "after");
+}
+
+// Whoever shares standard error may have made it non-blocking: a full pipe is then no reason to lose or tear a line.
+TEST(LogSink, ABusyDescriptorIsWaitedFor) {
+  Logged log(100'000);
+  ASSERT_EQ(fcntl(log.pipe.writer(), F_SETFL, O_NONBLOCK), 0);
+  constexpr std::size_t kLines = 3'000;
+  for (std::size_t i = 0; i < kLines; ++i) log.logger.info("{} {}", i, std::string(100, 'x'));
+  const auto lines = log.pipe.lines(kLines);
+  ASSERT_EQ(lines.size(), kLines);
+  for (std::size_t i = 0; i < kLines; ++i) EXPECT_EQ(lines[i], std::to_string(i) + " " + std::string(100, 'x'));
+  EXPECT_TRUE(log.sink->end(kLong));
+}
+
+TEST(LogSink, EveryLineIsWrittenOrCounted) {
+  const std::string path = ::testing::TempDir() + "log_sink_test.txt";
+  const int full = open("/dev/full", O_WRONLY | O_CLOEXEC), file = open(path.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+  ASSERT_GE(full, 0);
+  ASSERT_GE(file, 0);
+  std::size_t told_count = 0, lost_count = 0, logged_count = 0;
+  const auto sink = std::make_shared<LogSink>(full, 10, [&](std::size_t lines) {
+    ++told_count;
+    lost_count = lines;
+    return "lost " + std::to_string(lines);
+  });
+  spdlog::logger logger("test", sink);
+  logger.set_pattern("%v");
+  while (told_count == 0) logger.info("{}", logged_count++);
+  ASSERT_EQ(dup2(file, full), full);  // room again
+  while (told_count == 1) logger.info("{}", logged_count++);
+  ASSERT_TRUE(sink->end(kLong));
+  std::ifstream in(path);
+  const std::string text((std::istreambuf_iterator<char>(in)), {});
+  const auto lines = static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
+  EXPECT_EQ(lines + lost_count, logged_count + told_count);
+  EXPECT_THAT(text, ::testing::HasSubstr("lost " + std::to_string(lost_count) + "\n"));
+  close(full);
+  close(file);
+  std::remove(path.c_str());
 }
 
 TEST(LogSink, ALogWhoseReaderHasGoneIsNoReasonToStop) {
