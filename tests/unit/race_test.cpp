@@ -67,7 +67,7 @@ TEST(Racing, ItsWinnersAreNoWorseThanThoseOfSearchesThatScoreEverybodyWholly) {
   for (const double p : {0.1, 0.5, 0.9}) {
     const double less = testing::quantile(racing, p) - testing::quantile(whole, p);
     std::printf(" %.0f %% %+.4f", 100.0 * p, less);
-    EXPECT_GT(less, -testing::scaled(0.015, 0.005)) << p;
+    EXPECT_GT(less, -testing::scaled(0.02, 0.005)) << p;  // of 1,200 pairs such a difference is unsure by 0.01
   }
   std::printf("\n");
   EXPECT_LT(fields, 0.95 * all_fields);  // it is worth something
