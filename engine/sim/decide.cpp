@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "engine/base/check.hpp"
@@ -167,7 +168,7 @@ Decision decide_division(const Colony& colony, const Params& params, Seed seed, 
   event.corrected = found.corrected;
   const std::array<Body, 2> bodies = {Body(found.pair.bodies[0], params.noise), Body(found.pair.bodies[1], params.noise)};
   event.woken = wake_sleepers(colony, params, seed, time_h, {id, bodies}, &counted);
-  return {event, {counted, 1, found.evaluation_count}};
+  return {std::move(event), {counted, 1, found.evaluation_count}};
 }
 
 Decision decide_settling(const Colony& colony, const Params& params, Seed seed, CellId id, Workspace& workspace) {

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "engine/base/check.hpp"
@@ -142,7 +143,7 @@ Decision decide_move(const Colony& colony, const Params& params, Seed seed, Cell
     event.woken = wake_sleepers(colony, params, seed, time_h, change, &counted);
   }
   if (is_asleep(before)) look_around(colony, params, seed, time_h, change, before, event.cell, counted);
-  return {event, {counted, 0, 0, counted.field_count}};
+  return {std::move(event), {counted, 0, 0, counted.field_count}};
 }
 
 double draw_move_delay_h(const MotilityParams& motility, Stream& stream) {

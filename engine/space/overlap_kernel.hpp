@@ -1,6 +1,6 @@
 // overlap_kernel: the sign of one body's field over arrays of points, single precision: the hot loop of the whole engine.
-// Method:  Highway, dispatched at run time over EMU128, SSSE3, SSE4, AVX2 and AVX3; the plain C++ twin does the same operations
-//          in the same order.
+// Method:  Highway, dispatched at run time over SSSE3, SSE4, AVX2, AVX3 and its target without vectors (SCALAR; EMU128 from GCC 12.3 on, see
+//          engine/DESIGN.md, "What it promises"); the plain C++ twin does the same operations in the same order.
 // Why the same bits everywhere: only + - * and conversions, in a fixed order per point; no multiply-add, no contraction
 // (compiler flags), no reduction over points but integer counts. So a point's value does not depend on the width it was computed in.
 // Threads: pure but for the caller's buffers and CountWork.

@@ -143,12 +143,38 @@ TEST(Digests, DoNotDependOnTheWindowWithLayersEither) {
   }
 }
 
+// A scene for each kind of kernel: searches, layers, moves, the other contact rule, walls with several founders, neighbours that are asked.
+std::map<std::string, RunSpec> scenes_of_every_kernel() {
+  std::map<std::string, RunSpec> all;
+  all["paper"] = testing::spec_of(9, 30);
+  all["tumour"] = testing::spec_of(9, 60, *preset("tumour"));
+  all["young-colony"] = testing::spec_of(9, 40, *preset("young-colony"));
+
+  RunSpec spec = testing::spec_of(9, 30);
+  spec.params.contact.rule = ContactRule::kMax;
+  all["max"] = spec;
+
+  spec = testing::spec_of(9, 40);
+  spec.params.founders.count = 6;
+  spec.params.founders.radius_um = 30.0;
+  spec.params.dish.radius_um = 45.0;
+  all["dish of 6 founders"] = spec;
+
+  spec = testing::spec_of(9, 8);
+  spec.params.contact.neighbour_retained_min = 0.3;
+  all["retained"] = spec;
+  return all;
+}
+
 TEST(Digests, DoNotDependOnTheVectorWidth) {
-  const std::vector<RunSpec> specs = {testing::spec_of(9, 30), testing::spec_of(9, 60, *preset("tumour"))};
-  std::vector<std::string> expected;
-  for (const RunSpec& spec : specs) expected.push_back(digest_of(spec));
-  testing::on_every_target([&](const std::string& name) {
-    for (std::size_t i = 0; i < specs.size(); ++i) EXPECT_EQ(digest_of(specs[i]), expected[i]) << name << ", scene " << i;
+  const std::map<std::string, RunSpec> scenes = scenes_of_every_kernel();
+  std::map<std::string, std::string> expected;
+  for (const auto& [name, spec] : scenes) {
+    ASSERT_TRUE(validate(spec.params).empty()) << name;
+    expected[name] = digest_of(spec);
+  }
+  testing::on_every_target([&](const std::string& target) {
+    for (const auto& [name, spec] : scenes) EXPECT_EQ(digest_of(spec), expected[name]) << target << ", " << name;
   });
 }
 

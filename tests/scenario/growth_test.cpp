@@ -204,7 +204,8 @@ TEST(Growth, IsExponentialThenLimitedByContactWithSmallPassiveCellsInTheMiddleOf
 TEST(Growth, OfALoneColonyIsEndedByTheGenerationLimit) {
   const std::int64_t limit = testing::scaled<std::int64_t>(10, 40);
   std::vector<double> sizes, times;
-  for (const Seed seed : {1, 2, 3}) {
+  const Seed seeds = testing::scaled<Seed>(3, 40);
+  for (Seed seed = 1; seed <= seeds; ++seed) {
     RunSpec spec;
     spec.seed = seed;
     spec.params.division.generation_limit = limit;
@@ -224,8 +225,8 @@ TEST(Growth, OfALoneColonyIsEndedByTheGenerationLimit) {
   }
   const testing::Mean size = testing::mean_of(sizes);
   const testing::Mean time = testing::mean_of(times);
-  std::printf("figure: a lone colony of limit %d ends at %.0f +- %.0f cells after %.0f +- %.0f h (3 seeds)\n",
-              static_cast<int>(limit), size.value, size.se, time.value, time.se);
+  std::printf("figure: a lone colony of limit %d ends at %.0f +- %.0f cells after %.0f +- %.0f h (%d seeds)\n",
+              static_cast<int>(limit), size.value, size.se, time.value, time.se, static_cast<int>(seeds));
   // Between no more than a rim that never widens and a colony that doubles every generation to confluence of the same radius.
   EXPECT_GT(size.value, 0.4 * static_cast<double>(limit * limit));
   EXPECT_LT(size.value, 1.2 * static_cast<double>(limit * limit));

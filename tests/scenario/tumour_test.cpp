@@ -2,11 +2,14 @@
 // Reduced: 2 seeds to 250 cells; COLONY_TEST_FULL=1: 6 seeds to 2,000.
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <cstdio>
+#include <optional>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "engine/analysis/series.hpp"
 #include "engine/growth/support.hpp"
 #include "engine/space/overlap.hpp"
 #include "tests/support/runs.hpp"
@@ -112,6 +115,43 @@ TEST(Tumour, StandsDenserThanAMonolayer) {
   Params mono = *preset("tumour");
   mono.layers = Layers::kMono;
   EXPECT_LT(spread_um2(*preset("tumour")), 0.75 * spread_um2(mono));
+}
+
+// Growing in three layers is faster than in one, and takes less of the dish. Full: to the sizes that engine/DESIGN.md states.
+TEST(Tumour, GrowsFasterAndDenserThanAColonyOfOneLayer) {
+  const std::uint64_t some = testing::scaled<std::uint64_t>(150, 500), many = testing::scaled<std::uint64_t>(300, 5000);
+  struct Curve {
+    double some_h = 0.0, many_h = 0.0, cells_per_um2 = 0.0;
+  };
+  const auto grow = [&](const char* name, Seed seed, const Params& params) {
+    Simulator simulator(testing::spec_of(seed, many, params));
+    Curve curve;
+    double divisions = 0.0, searches_to_some = 0.0, top_um = 0.0;
+    while (const std::optional<Event> event = simulator.step()) {
+      if (event->kind() != EventKind::kDivided) continue;
+      ++divisions;
+      if (simulator.colony().cells().size() != some) continue;
+      curve.some_h = event->time_h;
+      searches_to_some = static_cast<double>(simulator.work().search_count) / divisions;
+    }
+    const Colony& colony = simulator.colony();
+    curve.many_h = colony.time_h();
+    curve.cells_per_um2 = static_cast<double>(many) / measure_series(colony, colony.time_h()).area_um2;
+    for (const Cell& cell : colony.cells()) top_um = std::max(top_um, colony.body(cell.id).box().high.z());
+    std::printf("figure: %s, seed %d: %d cells at %.0f h, %d at %.0f h, %.4f cells/um2 of its area, %.1f um at most to the top of a box; %.1f and %.1f "
+                "searches per division\n",
+                name, static_cast<int>(seed), static_cast<int>(some), curve.some_h, static_cast<int>(many), curve.many_h, curve.cells_per_um2,
+                top_um, searches_to_some, static_cast<double>(simulator.work().search_count) / divisions);
+    return curve;
+  };
+  Params mono = *preset("paper");
+  mono.division.generation_limit.reset();
+  const Curve control = grow("paper without limit", 1, mono);
+  for (Seed seed = 1; seed <= testing::scaled<Seed>(1, 3); ++seed) {
+    const Curve tumour = grow("tumour", seed, *preset("tumour"));
+    EXPECT_LT(tumour.many_h, control.many_h);
+    EXPECT_GT(tumour.cells_per_um2, 1.3 * control.cells_per_um2);
+  }
 }
 
 // With a search so short that its winner may float, the division is refused, also where everything else would be accepted.

@@ -2,8 +2,10 @@
 // Reduced: 24 seeds; COLONY_TEST_FULL=1: 60.
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -67,6 +69,27 @@ TEST(YoungColony, StandsMoreApartThanAColonyThatDoesNotMove) {
   print("distance to the nearest cell, um", nearest, paper_nearest);
   print("share of cells that touch nobody", alone, paper_alone);
   print("radius of gyration, um", gyration, paper_gyration);
+}
+
+// Crawling makes room, so fewer cells are inhibited.
+TEST(YoungColony, GrowsFasterThanAColonyThatDoesNotMove) {
+  const std::vector<std::uint64_t> sizes = testing::scaled<std::vector<std::uint64_t>>({100, 180}, {180, 1000});
+  std::vector<double> young, paper;  // h, at those sizes
+  for (const bool crawls : {false, true}) {
+    Params params = *preset(crawls ? "young-colony" : "paper");
+    params.division.generation_limit.reset();
+    Simulator simulator(testing::spec_of(1, sizes.back(), params));
+    while (const std::optional<Event> event = simulator.step()) {
+      std::vector<double>& hours = crawls ? young : paper;
+      if (hours.size() < sizes.size() && simulator.colony().cells().size() == sizes[hours.size()]) hours.push_back(event->time_h);
+    }
+  }
+  ASSERT_EQ(young.size(), sizes.size());
+  ASSERT_EQ(paper.size(), sizes.size());
+  for (std::size_t i = 0; i < sizes.size(); ++i) {
+    std::printf("figure: seed 1 without limit, %d cells: young-colony at %.0f h, paper at %.0f h\n", static_cast<int>(sizes[i]), young[i], paper[i]);
+    EXPECT_LT(young[i], 0.9 * paper[i]);
+  }
 }
 
 }  // namespace

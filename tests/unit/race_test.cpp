@@ -26,7 +26,7 @@ TEST(Racing, ItsWinnersAreNoWorseThanThoseOfSearchesThatScoreEverybodyWholly) {
   const Colony colony = testing::run(testing::spec_of(3, 120)).simulator.colony();
   Workspace workspace(params);
   Stream stream = testing::case_stream(1);
-  std::vector<double> racing, difference, on_search_points;
+  std::vector<double> racing, whole, difference, on_search_points;
   double candidates = 0.0, fields = 0.0, all_fields = 0.0;
   int passed = 0, all_passed = 0;
   const int searches = testing::scaled(1200, 10'000);
@@ -45,6 +45,7 @@ TEST(Racing, ItsWinnersAreNoWorseThanThoseOfSearchesThatScoreEverybodyWholly) {
     const SearchResult slow = find_space(colony, params, task, workspace);
     all_fields += static_cast<double>(workspace.overlap.work.field_count);
     racing.push_back(fast.fitness);
+    whole.push_back(slow.fitness);
     difference.push_back(fast.fitness - slow.fitness);
     on_search_points.push_back(fast.search_fitness - slow.search_fitness);
     candidates += fast.evaluation_count;
@@ -55,7 +56,20 @@ TEST(Racing, ItsWinnersAreNoWorseThanThoseOfSearchesThatScoreEverybodyWholly) {
   std::printf("figure: racing, %d pairs of searches: fitness %.4f, less without racing %+.4f +- %.4f (on the search's points %+.4f +- %.4f); "
               "would divide %d and %d; point evaluations %.0f %%\n",
               searches, testing::mean_of(racing).value, mean.value, mean.se, search.value, search.se, passed, all_passed, 100.0 * fields / all_fields);
-  EXPECT_GT(mean.value, std::min(-0.004, -2.0 * mean.se));
+  // Not inferior: the mean's lower 97.5 % bound lies above -margin. A search's own sampling error is 0.04, a pair is accepted from 0.75 on;
+  // giving candidates up at once (0 deviations instead of 2) costs 0.016. That nothing at all is lost is not claimed: 10,000 pairs show 0.0009.
+  const double margin = testing::scaled(0.005, 0.002);
+  EXPECT_GT(mean.value - 1.96 * mean.se, -margin) << mean.value << " +- " << mean.se;
+  // And not in the mean only.
+  const double distance = testing::ks_distance(racing, whole), bound = testing::ks_bound(racing.size(), whole.size());
+  std::printf("figure: racing, whole distribution: Kolmogorov-Smirnov distance %.4f (1 %% bound %.4f); quantiles less without racing:", distance, bound);
+  EXPECT_LT(distance, bound);
+  for (const double p : {0.1, 0.5, 0.9}) {
+    const double less = testing::quantile(racing, p) - testing::quantile(whole, p);
+    std::printf(" %.0f %% %+.4f", 100.0 * p, less);
+    EXPECT_GT(less, -testing::scaled(0.02, 0.005)) << p;  // of 1,200 pairs such a difference is unsure by 0.01
+  }
+  std::printf("\n");
   EXPECT_LT(fields, 0.95 * all_fields);  // it is worth something
   EXPECT_GT(candidates, 300.0 * searches);
 }
