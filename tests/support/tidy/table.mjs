@@ -21,6 +21,7 @@ export const mayInclude = {
   'server/config.*': ['engine/', 'server/'],
   'server/config_keys.*': ['engine/', 'server/'],
   'server/log.*': ['server/http/'],
+  'server/log_sink.*': [],
   'server/token_command.*': ['server/'],
   'client/': [],
   'tests/': ['engine/', 'server/', 'client/'],
