@@ -79,12 +79,13 @@ std::string resolve_job_id(Session& session, const std::string& text) { return r
 
 std::string resolve_id(Session& session, const std::string& text, const Collection& in) {
   const std::string one = in.one;
+  const std::string given = in.is_quoted ? "'" + printable(text) + "'" : "what was given";
   std::string wanted = text;
   std::transform(wanted.begin(), wanted.end(), wanted.begin(), [](unsigned char c) { return std::tolower(c); });
   const bool plausible =
       wanted.find_first_not_of("0123456789abcdef-") == std::string::npos && wanted.size() <= kIdLength;
   if (!plausible || wanted.size() < kSuffixMin) {
-    throw Failure(ExitCode::kUsage, "'" + printable(text) + "' is no " + one + " id: give a full id or at least its last " +
+    throw Failure(ExitCode::kUsage, given + " is no " + one + " id: give a full id or at least its last " +
                                         std::to_string(kSuffixMin) + " characters (`colony " + in.command + "` shows them)");
   }
   if (is_full_id(wanted)) return wanted;
@@ -107,10 +108,10 @@ std::string resolve_id(Session& session, const std::string& text, const Collecti
     if (next == body.end() || !next->is_string()) break;
     cursor = next->get<std::string>();
   }
-  if (matches.empty()) throw Failure(ExitCode::kRefused, "no " + one + "'s id ends in '" + wanted + "'");
+  if (matches.empty()) throw Failure(ExitCode::kRefused, "no " + one + "'s id ends in " + given);
   if (matches.size() > 1) {
     std::string message =
-        "'" + wanted + "' is the end of " + std::to_string(matches.size()) + " " + one + " ids; give more of it:";
+        given + " is the end of " + std::to_string(matches.size()) + " " + one + " ids; give more of it:";
     for (std::size_t i = 0; i < std::min<std::size_t>(matches.size(), 5); ++i)
       message += "\n  " + printable(matches[i]);
     if (matches.size() > 5) message += "\n  ...";

@@ -36,11 +36,12 @@ struct Collection {
   const char* one;      // "job"
   const char* command;  // that lists it
   bool has_pages = true;
+  bool is_quoted = true;  // whether errors repeat what was given for an id: where it may be a secret, nothing may keep it
 };
 inline constexpr Collection kJobs{"/v1/jobs", "job", "list"};
 inline constexpr Collection kAnalyses{"/v1/analyses", "analysis", "analyses"};
 inline constexpr Collection kComparisons{"/v1/comparisons", "comparison", "comparisons"};
-inline constexpr Collection kTokens{"/v1/tokens", "token", "tokens list", false};
+inline constexpr Collection kTokens{"/v1/tokens", "token", "tokens list", false, false};
 
 /// The full id for a full id (not looked up) or for the unique end of one, found in the server's list.
 /// Errors: kUsage for what cannot be an id or is ambiguous (the candidates are named), kRefused when none ends so.

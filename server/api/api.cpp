@@ -90,7 +90,7 @@ Api::Api(JobService& jobs, http::TokenTable& tokens, ApiConfig config) {
   context_->job_texts = std::make_shared<JobTexts>(jobs, context_->config.base_path);
   context_->pages = std::make_shared<Pages>(jobs, context_->config.base_path);
   context_->feeds = std::make_shared<Feeds>(jobs);
-  context_->kept = std::make_shared<KeptAnswers>(kKeptBytesMax);
+  context_->kept = std::make_shared<KeptAnswers>(kKeptBytesMax, kKeptEntriesMax);
   context_->schema_text = to_text(job_spec_schema(limits));
   const Json openapi = openapi_document(endpoints(), limits, context_->config.version, context_->config.base_path);
   context_->openapi_text = to_text(openapi);

@@ -174,10 +174,12 @@ std::string history_tag(const Context& context, const Call& call, const ColonyAt
 /// A job as the answer, with its tag.
 http::Response job_response(const Context& context, int status, const JobView& view);
 http::Response failure(const Error& error, const Call& call);
-/// 412 if the request names revisions of the path's job by If-Match and it has none of them, or has one that If-None-Match names; also
-/// the job's own failure.
+/// If-Match and If-None-Match of a request that changes a job, for the store to hold against its revision.
+RevisionCondition revision_condition(const Call& call);
+/// 412, where that did not hold for `job`: which of the two, and what the revision is.
+http::Response not_as_supposed(const Call& call, const JobRow& job);
+/// The same, compared now: for what makes another job and leaves this one as it is. Also the job's own failure.
 std::optional<http::Response> refused_by_preconditions(Context& context, const Call& call);
-http::Response no_such_revision(const Call& call, const JobRow& job);
 
 // One function per endpoint.
 http::Response post_job(Context& context, const Call& call);

@@ -210,6 +210,9 @@ void stamp(http::Response& response, const std::string& tag) {
 }
 
 Compared compared_by(const Endpoint& endpoint) {
+  // What is sent to a collection makes something that has no tag yet. The list's own tag is no stand-in: it changes with each event of
+  // any job, and the repetition that an Idempotency-Key allows would be told 412 because the first one had been carried out.
+  if (endpoint.method == "POST" && endpoint.path.find('{') == std::string_view::npos) return Compared::kNothing;
   if (endpoint.path.starts_with("/v1/jobs/{job_id}")) return Compared::kJob;
   return tagged_get(endpoint) != nullptr ? Compared::kGet : Compared::kNothing;
 }
@@ -221,7 +224,7 @@ std::optional<http::Response> refused_before(const Endpoint& endpoint, Context& 
   if (by == Compared::kNothing) {
     std::vector<FieldError> fields;
     for (const char* name : {"If-Match", "If-None-Match"}) {
-      if (call.request.headers.count(name) > 0) fields.push_back({name, "cannot be held: nothing here has a tag"});
+      if (call.request.headers.count(name) > 0) fields.push_back({name, "cannot be held: there is nothing with a tag to hold it against"});
     }
     return failure({ErrorCode::kMalformed, "this request takes no preconditions; nothing was done", std::move(fields)}, call);
   }

@@ -62,9 +62,9 @@ void stamp(http::Response& response, const std::string& tag);
 
 /// What If-Match and If-None-Match of a request that changes something are held against.
 enum class Compared {
-  kNothing,  // the target has no tag: such a request is refused (400), not passed over
+  kNothing,  // the target has no tag, or is a collection to add to: such a request is refused (400), not passed over
   kJob,      // the job of the path, by its revision; the handler looks (refused_by_preconditions)
-  kGet       // what GET of the same path answers
+  kGet       // what GET of the same path answers (DELETE of an analysis)
 };
 /// Of POST, PATCH and DELETE.
 Compared compared_by(const Endpoint& endpoint);

@@ -6,36 +6,42 @@ namespace {
 
 // Tried by the system tests as it stands here. For browsers and for Node: no `for await` over a body, which some browsers do not have.
 constexpr std::string_view kReadStream = R"js(// Reads an event stream to its end, and takes it up again where it broke off.
-// `handle` gets {event, id, data} of each message; `signal` (of an AbortController) ends the reading.
+// `handle` gets {event, id, data} of each message and is waited for; `signal` (of an AbortController) ends the reading.
+// What `handle` throws ends it too, and comes out here: `?after=ID` in the url goes on behind a message.
 async function readStream(url, token, handle, signal) {
-  let lastId = '';     // of the last message that came whole
+  let lastId = '';     // of the last message that was handled
   let wait_ms = 2000;  // before it is asked for again
   const pause = () => new Promise((done) => setTimeout(done, wait_ms));
 
   // One connection; true: the stream said that it is over.
   async function readOnce(body) {
     const reader = body.pipeThrough(new TextDecoderStream()).getReader();
+    const read = () => reader.read().catch(() => ({ done: true }));  // broken off: the connection's error, not yours
     let rest = '', event = 'message', id = lastId, data = [];
-    for (let piece = await reader.read(); !piece.done; piece = await reader.read()) {
-      const lines = (rest + piece.value).split('\n');
-      rest = lines.pop();  // not complete yet
-      for (const line of lines) {
-        if (line !== '') {
-          const [, name, value] = /^([^:]*):? ?(.*)$/.exec(line);
-          if (name === 'event') event = value;
-          else if (name === 'id') id = value;
-          else if (name === 'data') data.push(value);
-          else if (name === 'retry') wait_ms = Number(value);
-          continue;
+    try {
+      for (let piece = await read(); !piece.done; piece = await read()) {
+        const lines = (rest + piece.value).split('\n');
+        rest = lines.pop();  // not complete yet
+        for (const line of lines) {
+          if (line !== '') {
+            const [, name, value] = /^([^:]*):? ?(.*)$/.exec(line);
+            if (name === 'event') event = value;
+            else if (name === 'id') id = value;
+            else if (name === 'data') data.push(value);
+            else if (name === 'retry') wait_ms = Number(value);
+            continue;
+          }
+          if (data.length > 0) await handle({ event, id, data: data.join('\n') });
+          lastId = id;  // only now: a message that breaks off comes again
+          if (event === 'end') return true;
+          event = 'message';
+          data = [];
         }
-        lastId = id;  // only now: a message that breaks off comes again
-        if (data.length > 0) handle({ event, id, data: data.join('\n') });
-        if (event === 'end') return true;
-        event = 'message';
-        data = [];
       }
+      return false;
+    } finally {
+      reader.cancel().catch(() => {});  // where handle threw, the connection would stay
     }
-    return false;
   }
 
   while (!signal?.aborted) {
@@ -51,11 +57,7 @@ async function readStream(url, token, handle, signal) {
     }
     if (response.status === 204) return;  // nothing is left
     if (response.ok) {
-      try {
-        if (await readOnce(response.body)) return;
-      } catch {
-        // broken off
-      }
+      if (await readOnce(response.body)) return;
     } else if (response.status !== 429 && response.status < 500) {
       throw new Error(`${response.status}: ${await response.text()}`);  // asking again would not help: 401, 404
     }

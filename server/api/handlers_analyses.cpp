@@ -162,6 +162,7 @@ http::Response removed(Context& context, const Call& call, AnalysisKind kind) {
   const Status gone = context.jobs.store().analyses().remove(kind, call.id());
   if (!gone) return failure(gone.error(), call);
   if (context.worker) context.worker->drop(call.id());
+  context.kept->drop(call.id());
   http::Response response;
   response.status = 204;
   return response;
@@ -201,7 +202,7 @@ http::Response get_analysis_objects(Context& context, const Call& call) {
     response = json_response(200, {{"items", std::move(items)}, {"next", nullptr}});
   }
   stamp(response, tag);
-  context.kept->keep(tag, response);
+  context.kept->keep(tag, {row->id}, response);
   return response;
 }
 
@@ -237,7 +238,7 @@ http::Response get_analysis_step(Context& context, const Call& call) {
   response.headers.set("Content-Type", call.media);
   response.body = std::move(*png);
   stamp(response, tag);
-  context.kept->keep(tag, response);
+  context.kept->keep(tag, {row->id}, response);
   return response;
 }
 

@@ -143,7 +143,7 @@ http::Response get_comparison_figure(Context& context, const Call& call) {
   response.headers.set("Content-Type", call.media);
   response.body = comparison_figure(*comparison);
   stamp(response, tag);
-  context.kept->keep(tag, response);
+  context.kept->keep(tag, {row->id, row->analysis_id, row->job_id}, response);
   return response;
 }
 

@@ -65,27 +65,30 @@ class JobWait : public http::LaterAnswer {
 
 }  // namespace
 
-http::Response no_such_revision(const Call& call, const JobRow& job) {
-  return problem_response(
-      ProblemKind::kPreconditionFailed,
-      {ErrorCode::kConflict, "the job is at revision " + std::to_string(job.revision) + "; nothing was changed",
-       {{"If-Match", "names no tag of revision " + std::to_string(job.revision) + " (a weak tag names none)"}}},
-      call.request.request_id);
+RevisionCondition revision_condition(const Call& call) {
+  RevisionCondition condition;
+  if (call.if_match && !call.if_match->is_any) condition.one_of = revisions_of(*call.if_match, false);
+  if (call.if_none_match && call.if_none_match->is_any) condition.one_of = std::vector<std::uint64_t>{};  // whatever is there is one too many
+  if (call.if_none_match) condition.none_of = revisions_of(*call.if_none_match, true);
+  return condition;
+}
+
+http::Response not_as_supposed(const Call& call, const JobRow& job) {
+  const std::string revision = std::to_string(job.revision);
+  const bool is_matched = !call.if_match || call.if_match->is_any || names_revision(*call.if_match, job, false);
+  const FieldError fault = is_matched ? FieldError{"If-None-Match", "names revision " + revision + ", or any"}
+                                      : FieldError{"If-Match", "names no tag of revision " + revision + " (a weak tag names none)"};
+  return problem_response(ProblemKind::kPreconditionFailed,
+                          {ErrorCode::kConflict, "the job is at revision " + revision + "; nothing was changed", {fault}},
+                          call.request.request_id);
 }
 
 std::optional<http::Response> refused_by_preconditions(Context& context, const Call& call) {
-  const bool must_match = call.if_match && !call.if_match->is_any;
-  if (!must_match && !call.if_none_match) return std::nullopt;
+  if (!call.if_match && !call.if_none_match) return std::nullopt;
   const auto view = context.jobs.show(call.id());
   if (!view) return failure(view.error(), call);
-  if (must_match && !names_revision(*call.if_match, view->job, false)) return no_such_revision(call, view->job);
-  if (!call.if_none_match) return std::nullopt;
-  if (!call.if_none_match->is_any && !names_revision(*call.if_none_match, view->job, true)) return std::nullopt;
-  const std::string revision = std::to_string(view->job.revision);
-  return problem_response(ProblemKind::kPreconditionFailed,
-                          {ErrorCode::kConflict, "the job is at revision " + revision + "; nothing was changed",
-                           {{"If-None-Match", "names revision " + revision + ", or any"}}},
-                          call.request.request_id);
+  if (revision_condition(call).holds(view->job.revision)) return std::nullopt;
+  return not_as_supposed(call, view->job);
 }
 
 http::Response get_job(Context& context, const Call& call) {
@@ -118,14 +121,9 @@ http::Response patch_job(Context& context, const Call& call) {
   if (!body) return failure(body.error(), call);
   const auto change = decode_job_patch(*body);
   if (!change) return failure(change.error(), call);
-  if (call.if_none_match) {
-    if (auto refused = refused_by_preconditions(context, call)) return std::move(*refused);
-  }
-  std::optional<std::vector<std::uint64_t>> revisions;  // of If-Match: compared when it is written
-  if (call.if_match && !call.if_match->is_any) revisions = revisions_of(*call.if_match, false);
-  const auto edited = context.jobs.edit(call.id(), *change, revisions, call.request.principal.name);
+  const auto edited = context.jobs.edit(call.id(), *change, revision_condition(call), call.request.principal.name);
   if (!edited) return failure(edited.error(), call);
-  if (!edited->is_current) return no_such_revision(call, edited->view.job);
+  if (!edited->is_current) return not_as_supposed(call, edited->view.job);
   return job_response(context, 200, edited->view);
 }
 

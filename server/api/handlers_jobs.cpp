@@ -6,6 +6,7 @@
 #include "server/api/codec_event.hpp"
 #include "server/api/estimate.hpp"
 #include "server/api/job_texts.hpp"
+#include "server/api/kept.hpp"
 #include "server/api/submission.hpp"
 
 namespace colony::server::api {
@@ -43,12 +44,13 @@ class ManyFounders {
 };
 
 http::Response command(Context& context, const Call& call,
-                       Result<JobService::Commanded> (JobService::*method)(const std::string&, const std::string&)) {
+                       Result<JobService::Commanded> (JobService::*method)(const std::string&, const std::string&,
+                                                                           const RevisionCondition&)) {
   if (const Status arguments = check_no_arguments(call.request.body); !arguments)
     return failure(arguments.error(), call);
-  if (auto refused = refused_by_preconditions(context, call)) return std::move(*refused);
-  const auto done = (context.jobs.*method)(call.id(), call.request.principal.name);
+  const auto done = (context.jobs.*method)(call.id(), call.request.principal.name, revision_condition(call));
   if (!done) return failure(done.error(), call);
+  if (!done->is_current) return not_as_supposed(call, done->view.job);
   return job_response(context, done->changed ? 202 : 200, done->view);
 }
 
@@ -131,14 +133,15 @@ http::Response pause_job(Context& context, const Call& call) { return command(co
 http::Response resume_job(Context& context, const Call& call) { return command(context, call, &JobService::resume); }
 
 http::Response delete_job(Context& context, const Call& call) {
-  if (auto refused = refused_by_preconditions(context, call)) return std::move(*refused);
-  const Status removed = context.jobs.remove(call.id());
+  const auto removed = context.jobs.remove(call.id(), revision_condition(call));
   if (!removed) {
     // The one conflict that is not about an ended job.
     const ProblemKind kind = removed.error().code == ErrorCode::kConflict ? ProblemKind::kJobNotTerminal
                                                                           : problem_kind_of(removed.error().code);
     return problem_response(kind, removed.error(), call.request.request_id);
   }
+  if (!removed->is_current) return not_as_supposed(call, removed->job);
+  context.kept->drop(call.id());  // figures of comparisons with it
   http::Response response;
   response.status = 204;
   return response;

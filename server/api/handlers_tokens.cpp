@@ -46,12 +46,17 @@ Result<http::KnownToken> known(const TokenRow& row) {
   return http::KnownToken{row.id, row.name, *scope, row.secret_hash, *expires};
 }
 
-/// Whether this token is valid, an admin's, and no other is.
+/// Whether this token is valid, an admin's, and no other will be for another kSpareAdminLife_h: one that ends in a moment would let
+/// the last one go, and then nobody is left.
 bool is_last_admin(const std::vector<TokenRow>& rows, const std::string& id) {
-  const std::string now = wall_time_text();  // such texts are in the order of time
+  const std::int64_t now_ms = http::unix_time_ms();
+  const std::string now = wall_time_text_at(now_ms);  // such texts are in the order of time
+  const std::string until = wall_time_text_at(now_ms + kSpareAdminLife_h * 3'600'000);
   bool is_one = false, is_other = false;
   for (const TokenRow& row : rows) {
-    if (row.scope == "admin" && row.expires_at > now) (row.id == id ? is_one : is_other) = true;
+    if (row.scope != "admin") continue;
+    if (row.id == id) is_one = row.expires_at > now;
+    if (row.id != id && row.expires_at >= until) is_other = true;
   }
   return is_one && !is_other;
 }
@@ -165,8 +170,9 @@ http::Response delete_token(Context& context, const Call& call) {
     if (!rows) return failure(rows.error(), call);
     if (is_last_admin(*rows, call.id())) {
       return problem_response(ProblemKind::kLastAdmin,
-                              {ErrorCode::kConflict, "no other valid token has scope admin, so nobody could make one any more; make another "
-                                                     "first. With the server stopped, `colonyd token create` makes one too"},
+                              {ErrorCode::kConflict, "no other token of scope admin is valid for at least " + std::to_string(kSpareAdminLife_h) +
+                                                     " h more, so soon nobody could make one; make such a one first. With the server stopped, "
+                                                     "`colonyd token create` makes one too"},
                               call.request.request_id);
     }
   }

@@ -18,6 +18,7 @@ namespace colony::server::api {
 inline constexpr std::size_t kTokenNameBytesMax = 64;
 inline constexpr double kTokenLifeMin_h = 0.001;     // 3.6 s: less is a slip of the unit
 inline constexpr double kTokenLifeMax_h = 87'600.0;  // ten years
+inline constexpr std::int64_t kSpareAdminLife_h = 1;  // an admin's token counts as another one where the last is revoked if it lasts so long
 
 struct TokenWish {
   std::string name;

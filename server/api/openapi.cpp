@@ -202,6 +202,9 @@ Json openapi_document(std::span<const Endpoint> table, const SpecLimits& limits,
     if (std::find(endpoint.media.begin(), endpoint.media.end(), "text/event-stream") != endpoint.media.end()) {
       operation["description"] = kStreamText;
     }
+    if (endpoint.method != "GET" && compared_by(endpoint) == Compared::kNothing) {
+      operation["description"] = "Takes no preconditions: with If-Match or If-None-Match it is refused (400) and nothing is done.";
+    }
     if (endpoint.method == "POST" || endpoint.method == "PATCH") operation["requestBody"] = request_body_of(endpoint);
     if (const Json examples = request_examples(endpoint.operation_id); !examples.is_null()) {
       for (auto& [media, content] : operation["requestBody"]["content"].items()) content["examples"] = examples;

@@ -29,6 +29,32 @@ constexpr std::array<ProblemRow, 18> kTable = {{
     {ProblemKind::kLastAdmin, 409, "last-admin-token", "It is the last token with which tokens can be made", 0},
 }};
 
+http::Response problem_document(const ProblemRow& row, const Error& error, std::string_view request_id) {
+  Json body = {{"type", "urn:colony:problem:" + std::string(row.code)},
+               {"title", row.title},
+               {"status", row.status},
+               {"detail", error.message},
+               {"request_id", request_id}};
+  if (!error.fields.empty()) {
+    Json& fields = body["errors"] = Json::array();
+    if (error.fields.size() > kProblemErrorsMax) {
+      body["detail"] = error.message + " (the first " + std::to_string(kProblemErrorsMax) + " of " +
+                       std::to_string(error.fields.size()) + " errors are listed)";
+    }
+    for (const FieldError& field : error.fields) {
+      if (fields.size() >= kProblemErrorsMax) break;
+      const bool is_pointer = field.pointer.empty() || field.pointer.front() == '/';
+      fields.push_back({{is_pointer ? "pointer" : "parameter", field.pointer}, {"message", field.message}});
+    }
+  }
+  http::Response response;
+  response.status = row.status;
+  response.headers.set("Content-Type", "application/problem+json");
+  if (row.retry_after_s > 0) response.headers.set("Retry-After", std::to_string(row.retry_after_s));
+  response.body = to_text(body);
+  return response;
+}
+
 }  // namespace
 
 std::span<const ProblemRow> problem_table() { return kTable; }
@@ -69,30 +95,14 @@ ProblemKind problem_kind_of(ErrorCode code) {
 
 http::Response problem_response(ProblemKind kind, const Error& error, std::string_view request_id) {
   const ProblemRow& row = problem_row(kind);
-  Json body = {{"type", "urn:colony:problem:" + std::string(row.code)},
-               {"title", row.title},
-               {"status", row.status},
-               {"detail", error.message},
-               {"request_id", request_id}};
-  if (!error.fields.empty()) {
-    Json& fields = body["errors"] = Json::array();
-    if (error.fields.size() > kProblemErrorsMax) {
-      body["detail"] = error.message + " (the first " + std::to_string(kProblemErrorsMax) + " of " +
-                       std::to_string(error.fields.size()) + " errors are listed)";
-    }
-    for (const FieldError& field : error.fields) {
-      if (fields.size() >= kProblemErrorsMax) break;
-      const bool is_pointer = field.pointer.empty() || field.pointer.front() == '/';
-      fields.push_back({{is_pointer ? "pointer" : "parameter", field.pointer}, {"message", field.message}});
-    }
+  // Why a bug showed itself is the operator's to know: expressions and paths of the source, what the database said.
+  if (row.status == 500) {
+    const Error told{error.code, "the server's log has more under this request_id", {}};
+    http::Response response = problem_document(row, told, request_id);
+    response.failure = error.message;
+    return response;
   }
-  http::Response response;
-  response.status = row.status;
-  response.headers.set("Content-Type", "application/problem+json");
-  if (row.retry_after_s > 0) response.headers.set("Retry-After", std::to_string(row.retry_after_s));
-  response.body = to_text(body);
-  if (row.status == 500) response.failure = error.message;
-  return response;
+  return problem_document(row, error, request_id);
 }
 
 http::Response problem_response(const Error& error, std::string_view request_id) {

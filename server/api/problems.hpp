@@ -52,7 +52,8 @@ const ProblemRow& problem_row(ProblemKind kind);
 ProblemKind problem_kind_of(ErrorCode code);
 
 /// The problem document of an error. A field whose name is empty or begins with '/' is a JSON Pointer into the body,
-/// any other the name of a query parameter or header.
+/// any other the name of a query parameter or header. Of a 500 the document says that the log has more; the error's own message is
+/// Response::failure, for the log alone.
 http::Response problem_response(ProblemKind kind, const Error& error, std::string_view request_id);
 http::Response problem_response(const Error& error, std::string_view request_id);
 

@@ -138,12 +138,13 @@ bool LocalJobService::wait_until_left(std::int64_t job_key) {
 }
 
 Result<JobService::Commanded> LocalJobService::command(const std::string& id, JobCommand what, LiveJob::Wish wish,
-                                                      const std::string& actor) {
+                                                      const std::string& actor, const RevisionCondition& condition) {
   const auto job = store_.find_job(id);
   if (!job) return job.error();
   const std::int64_t job_key = job->job_key;
-  auto commanded = store_.command_job(job_key, what, actor);  // durable from here on, whatever becomes of the notification
+  auto commanded = store_.command_job(job_key, what, actor, condition);  // durable from here on, whatever becomes of the notification
   if (!commanded) return commanded.error();
+  if (!commanded->is_current) return Commanded{view_of(std::move(commanded->job)), false, false};
   bool changed = commanded->changed;
   if (commanded->pending) {
     {
@@ -154,6 +155,7 @@ Result<JobService::Commanded> LocalJobService::command(const std::string& id, Jo
     if (wait_until_left(job_key)) {
       // The runner has left the job: paused, cancelled, or ended by itself before the wish reached it.
       if (what == JobCommand::kResume) {
+        // Without the condition: it held, and the pause that was waited for is a revision of its own.
         commanded = store_.command_job(job_key, what, actor);
         if (!commanded) return commanded.error();
         changed = changed || commanded->changed;
@@ -173,25 +175,28 @@ Result<JobService::Commanded> LocalJobService::command(const std::string& id, Jo
   return Commanded{view_of(std::move(commanded->job)), changed};
 }
 
-Result<JobService::Commanded> LocalJobService::cancel(const std::string& id, const std::string& actor) {
-  return command(id, JobCommand::kCancel, LiveJob::Wish::kCancel, actor);
+Result<JobService::Commanded> LocalJobService::cancel(const std::string& id, const std::string& actor,
+                                                      const RevisionCondition& condition) {
+  return command(id, JobCommand::kCancel, LiveJob::Wish::kCancel, actor, condition);
 }
 
-Result<JobService::Commanded> LocalJobService::pause(const std::string& id, const std::string& actor) {
-  return command(id, JobCommand::kPause, LiveJob::Wish::kPause, actor);
+Result<JobService::Commanded> LocalJobService::pause(const std::string& id, const std::string& actor,
+                                                     const RevisionCondition& condition) {
+  return command(id, JobCommand::kPause, LiveJob::Wish::kPause, actor, condition);
 }
 
-Result<JobService::Commanded> LocalJobService::resume(const std::string& id, const std::string& actor) {
-  return command(id, JobCommand::kResume, LiveJob::Wish::kNone, actor);
+Result<JobService::Commanded> LocalJobService::resume(const std::string& id, const std::string& actor,
+                                                      const RevisionCondition& condition) {
+  return command(id, JobCommand::kResume, LiveJob::Wish::kNone, actor, condition);
 }
 
-Status LocalJobService::remove(const std::string& id) {
+Result<JobService::Removed> LocalJobService::remove(const std::string& id, const RevisionCondition& condition) {
   const auto job = store_.find_job(id);
   if (!job) return job.error();
-  const Status removed = store_.delete_job(job->job_key);
-  if (!removed) return removed.error();
-  forget(*job);
-  return Ok{};
+  auto deleted = store_.delete_job(job->job_key, condition);
+  if (!deleted) return deleted.error();
+  if (deleted->is_current) forget(*job);
+  return Removed{std::move(deleted->job), deleted->is_current};
 }
 
 void LocalJobService::forget(const JobRow& job) {
@@ -204,11 +209,10 @@ void LocalJobService::forget(const JobRow& job) {
 }
 
 Result<JobService::Edited> LocalJobService::edit(const std::string& id, const JobTextChange& change,
-                                                 const std::optional<std::vector<std::uint64_t>>& revisions,
-                                                 const std::string& actor) {
+                                                 const RevisionCondition& condition, const std::string& actor) {
   const auto job = store_.find_job(id);
   if (!job) return job.error();
-  auto updated = store_.update_job_text(job->job_key, change, revisions, actor);
+  auto updated = store_.update_job_text(job->job_key, change, condition, actor);
   if (!updated) return updated.error();
   if (updated->changed) hub_->announce({job->job_key, JobNews::Kind::kChange});
   return Edited{view_of(std::move(updated->job)), updated->changed, updated->is_current};

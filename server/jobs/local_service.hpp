@@ -40,12 +40,12 @@ class LocalJobService final : public JobService {
   Result<Page> list(const JobFilter& filter, std::size_t limit, const std::string& cursor) override;
   Result<std::vector<std::uint64_t>> counts() override;
 
-  Result<Commanded> cancel(const std::string& id, const std::string& actor) override;
-  Result<Commanded> pause(const std::string& id, const std::string& actor) override;
-  Result<Commanded> resume(const std::string& id, const std::string& actor) override;
-  Status remove(const std::string& id) override;
+  Result<Commanded> cancel(const std::string& id, const std::string& actor, const RevisionCondition& condition) override;
+  Result<Commanded> pause(const std::string& id, const std::string& actor, const RevisionCondition& condition) override;
+  Result<Commanded> resume(const std::string& id, const std::string& actor, const RevisionCondition& condition) override;
+  Result<Removed> remove(const std::string& id, const RevisionCondition& condition) override;
   Result<Edited> edit(const std::string& id, const JobTextChange& change,
-                      const std::optional<std::vector<std::uint64_t>>& revisions, const std::string& actor) override;
+                      const RevisionCondition& condition, const std::string& actor) override;
 
   Result<std::vector<Event>> events(const std::string& id, const EventFilter& filter, std::size_t limit) override;
   Result<std::optional<std::uint64_t>> page_end(const std::string& id, const EventFilter& filter,
@@ -84,7 +84,7 @@ class LocalJobService final : public JobService {
   /// The seq of the last event up to `at_h`.
   Result<std::uint64_t> seq_of(const JobRow& job, std::optional<double> at_h);
   Result<Commanded> command(const std::string& id, JobCommand command, LiveJob::Wish wish,
-                            const std::string& actor);
+                            const std::string& actor, const RevisionCondition& condition);
   /// Waits until no runner holds the job; false after command_wait_ms or when draining.
   bool wait_until_left(std::int64_t job_key);
 

@@ -143,16 +143,19 @@ class JobService {
   virtual Result<std::vector<std::uint64_t>> counts() = 0;
 
   /// `changed` false: the job was already in the state this leads to. Another terminal state: kConflict ("job-terminal").
-  struct Commanded { JobView view; bool changed = true; };
+  /// `is_current` false: `condition` did not hold (for the store, as it wrote), and nothing was done; so in all that follows.
+  struct Commanded { JobView view; bool changed = true; bool is_current = true; };
   /// `actor`: who asks; it goes into the job's log with what was done.
-  virtual Result<Commanded> cancel(const std::string& id, const std::string& actor) = 0;
-  virtual Result<Commanded> pause(const std::string& id, const std::string& actor) = 0;
-  virtual Result<Commanded> resume(const std::string& id, const std::string& actor) = 0;
-  virtual Status remove(const std::string& id) = 0;
+  virtual Result<Commanded> cancel(const std::string& id, const std::string& actor, const RevisionCondition& condition = {}) = 0;
+  virtual Result<Commanded> pause(const std::string& id, const std::string& actor, const RevisionCondition& condition = {}) = 0;
+  virtual Result<Commanded> resume(const std::string& id, const std::string& actor, const RevisionCondition& condition = {}) = 0;
+  /// As Store::delete_job.
+  struct Removed { JobRow job; bool is_current = true; };
+  virtual Result<Removed> remove(const std::string& id, const RevisionCondition& condition = {}) = 0;
   /// As Store::update_job_text.
   struct Edited { JobView view; bool changed = true; bool is_current = true; };
   virtual Result<Edited> edit(const std::string& id, const JobTextChange& change,
-                              const std::optional<std::vector<std::uint64_t>>& revisions, const std::string& actor) = 0;
+                              const RevisionCondition& condition, const std::string& actor) = 0;
 
   virtual Result<std::vector<Event>> events(const std::string& id, const EventFilter& filter, std::size_t limit) = 0;
   /// As Store::page_end.

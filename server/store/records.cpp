@@ -1,5 +1,6 @@
 #include "server/store/records.hpp"
 
+#include <algorithm>
 #include <array>
 
 namespace colony::server {
@@ -19,6 +20,13 @@ std::optional<JobState> job_state_from(std::string_view name) {
 
 bool is_terminal(JobState state) {
   return state == JobState::kSucceeded || state == JobState::kFailed || state == JobState::kCancelled;
+}
+
+bool RevisionCondition::holds(std::uint64_t revision) const {
+  const auto names = [revision](const std::vector<std::uint64_t>& list) {
+    return std::find(list.begin(), list.end(), revision) != list.end();
+  };
+  return (!one_of || names(*one_of)) && !names(none_of);
 }
 
 bool may_follow(JobState from, JobState to) {

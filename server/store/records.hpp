@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "engine/base/digest.hpp"
 
@@ -65,6 +66,13 @@ struct JobRow {
   // As of last_seq, stored with the events:
   double time_h = 0.0;
   std::uint64_t cell_count = 0, active_count = 0, passive_count = 0, senescent_count = 0;
+};
+
+/// Which revision a job must have for a write to be done. It is looked at in the transaction that writes, so nothing comes in between.
+struct RevisionCondition {
+  std::optional<std::vector<std::uint64_t>> one_of;   // without: any; empty: none will do
+  std::vector<std::uint64_t> none_of;
+  bool holds(std::uint64_t revision) const;
 };
 
 /// What a client wants of a job's name and labels. What is not named stays as it is.

@@ -33,11 +33,11 @@ class SqliteStore final : public Store {
                            const std::string& reason, const std::string& detail) override;
   Result<JobRow> finish_job(const EventBatch& last, JobState state, const std::string& reason,
                             const std::string& detail) override;
-  Result<Commanded> command_job(std::int64_t job_key, JobCommand command, const std::string& actor) override;
+  Result<Commanded> command_job(std::int64_t job_key, JobCommand command, const std::string& actor,
+                                const RevisionCondition& condition) override;
   Result<TextUpdated> update_job_text(std::int64_t job_key, const JobTextChange& change,
-                                      const std::optional<std::vector<std::uint64_t>>& revisions,
-                                      const std::string& actor) override;
-  Status delete_job(std::int64_t job_key) override;
+                                      const RevisionCondition& condition, const std::string& actor) override;
+  Result<Deleted> delete_job(std::int64_t job_key, const RevisionCondition& condition) override;
   Result<std::vector<JobRow>> expire_jobs(const RetentionLimits& limits, std::int64_t now_ms) override;
   Result<std::vector<JobRow>> running_jobs() override;
 

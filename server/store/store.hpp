@@ -111,18 +111,20 @@ class Store {
   /// Pause: queued becomes paused ("user"), so does paused ("storage"); of a running one the wish is recorded.
   /// Resume: paused becomes queued. Already there: changed = false. Another terminal state, or a wish that a recorded cancel
   /// forbids: kConflict. `pending`: the job runs on until its runner has carried out job.command; then ask again.
-  struct Commanded { JobRow job; bool changed = true; bool pending = false; };
+  /// Before all that: if `condition` does not hold, nothing changes and is_current is false.
+  struct Commanded { JobRow job; bool changed = true; bool pending = false; bool is_current = true; };
   /// `actor`: who asked, for the log; empty: the service itself.
-  virtual Result<Commanded> command_job(std::int64_t job_key, JobCommand command, const std::string& actor = {}) = 0;
-  /// Name and labels, in any state. Decided in one transaction: if `revisions` is given and has not the job's, nothing changes and
-  /// is_current is false; what leaves all as it was changes nothing, not even the revision. More than labels_max labels: kInvalid
-  /// "/labels". Adds a log line.
+  virtual Result<Commanded> command_job(std::int64_t job_key, JobCommand command, const std::string& actor = {},
+                                        const RevisionCondition& condition = {}) = 0;
+  /// Name and labels, in any state. Decided in one transaction: if `condition` does not hold, nothing changes and is_current is false;
+  /// what leaves all as it was changes nothing, not even the revision. More than labels_max labels: kInvalid "/labels". Adds a log line.
   struct TextUpdated { JobRow job; bool changed = true; bool is_current = true; };
   virtual Result<TextUpdated> update_job_text(std::int64_t job_key, const JobTextChange& change,
-                                              const std::optional<std::vector<std::uint64_t>>& revisions,
-                                              const std::string& actor) = 0;
-  /// Only terminal jobs (else kConflict); events, placements, series and log go with it.
-  virtual Status delete_job(std::int64_t job_key) = 0;
+                                              const RevisionCondition& condition, const std::string& actor) = 0;
+  /// Only terminal jobs (else kConflict); events, placements, series and log go with it. Before that is asked: if `condition` does not
+  /// hold, nothing changes and is_current is false.
+  struct Deleted { JobRow job; bool is_current = true; };
+  virtual Result<Deleted> delete_job(std::int64_t job_key, const RevisionCondition& condition = {}) = 0;
   /// Marks as deleted what the limits let go at `now_ms` (since 1970): first by age, then, once nothing is being removed any more, by
   /// bytes. Returns the rows marked, at most 100 a call; their histories go as with delete_job.
   virtual Result<std::vector<JobRow>> expire_jobs(const RetentionLimits& limits, std::int64_t now_ms) = 0;

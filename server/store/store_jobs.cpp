@@ -238,11 +238,12 @@ Result<JobRow> SqliteStore::finish_job(const EventBatch& last, JobState state, c
       /*in_order=*/true);
 }
 
-Result<Store::Commanded> SqliteStore::command_job(std::int64_t job_key, JobCommand command,
-                                                     const std::string& actor) {
+Result<Store::Commanded> SqliteStore::command_job(std::int64_t job_key, JobCommand command, const std::string& actor,
+                                                  const RevisionCondition& condition) {
   return write<Commanded>([&](Connection& connection) -> Result<Commanded> {
     std::optional<JobRow> job = find_job_row(connection, job_key);
     if (!job) return no_job();
+    if (!condition.holds(job->revision)) return Commanded{std::move(*job), false, false, false};
     switch (command) {
       case JobCommand::kCancel:
         return command_cancel(connection, std::move(*job), actor);
@@ -258,13 +259,11 @@ Result<Store::Commanded> SqliteStore::command_job(std::int64_t job_key, JobComma
 }
 
 Result<Store::TextUpdated> SqliteStore::update_job_text(std::int64_t job_key, const JobTextChange& change,
-                                                        const std::optional<std::vector<std::uint64_t>>& revisions,
-                                                        const std::string& actor) {
+                                                        const RevisionCondition& condition, const std::string& actor) {
   return write<TextUpdated>([&](Connection& connection) -> Result<TextUpdated> {
     std::optional<JobRow> job = find_job_row(connection, job_key);
     if (!job) return no_job();
-    if (revisions && std::find(revisions->begin(), revisions->end(), job->revision) == revisions->end())
-      return TextUpdated{std::move(*job), false, false};
+    if (!condition.holds(job->revision)) return TextUpdated{std::move(*job), false, false};
     const std::string name = change.name.value_or(job->name);
     std::map<std::string, std::string> labels = with_changes(job->labels, change);
     if (labels.size() > change.labels_max) {
@@ -284,19 +283,20 @@ Result<Store::TextUpdated> SqliteStore::update_job_text(std::int64_t job_key, co
   });
 }
 
-Status SqliteStore::delete_job(std::int64_t job_key) {
-  const Status status = writer_->request([&](Connection& connection) -> Status {
-    const std::optional<JobRow> job = find_job_row(connection, job_key);
+Result<Store::Deleted> SqliteStore::delete_job(std::int64_t job_key, const RevisionCondition& condition) {
+  auto deleted = write<Deleted>([&](Connection& connection) -> Result<Deleted> {
+    std::optional<JobRow> job = find_job_row(connection, job_key);
     if (!job) return no_job();
+    if (!condition.holds(job->revision)) return Deleted{std::move(*job), false};
     if (!is_terminal(job->state)) {
       return Error{ErrorCode::kConflict,
                    "the job is " + std::string(name_of(job->state)) + "; only an ended job can be deleted"};
     }
     mark_job_deleted(connection, job_key);
-    return Ok{};
+    return Deleted{std::move(*job), true};
   });
-  if (status) writer_->wake_sweep();
-  return status;
+  if (deleted && deleted->is_current) writer_->wake_sweep();
+  return deleted;
 }
 
 }  // namespace colony::server

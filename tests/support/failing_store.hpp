@@ -111,15 +111,16 @@ class FailingStore final : public server::Store {
     return set;
   }
   Result<Commanded> command_job(std::int64_t job_key, server::JobCommand command,
-                                const std::string& actor = {}) override {
-    return real_->command_job(job_key, command, actor);
+                                const std::string& actor = {}, const server::RevisionCondition& condition = {}) override {
+    return real_->command_job(job_key, command, actor, condition);
   }
   Result<TextUpdated> update_job_text(std::int64_t job_key, const server::JobTextChange& change,
-                                      const std::optional<std::vector<std::uint64_t>>& revisions,
-                                      const std::string& actor) override {
-    return real_->update_job_text(job_key, change, revisions, actor);
+                                      const server::RevisionCondition& condition, const std::string& actor) override {
+    return real_->update_job_text(job_key, change, condition, actor);
   }
-  Status delete_job(std::int64_t job_key) override { return real_->delete_job(job_key); }
+  Result<Deleted> delete_job(std::int64_t job_key, const server::RevisionCondition& condition = {}) override {
+    return real_->delete_job(job_key, condition);
+  }
   Result<std::vector<JobRow>> running_jobs() override { return real_->running_jobs(); }
   std::uint64_t commit_count() const override { return real_->commit_count(); }
   Status flush() override { return real_->flush(); }

@@ -71,6 +71,27 @@ test('with tokens', async (t) => {
     assert.equal(events.at(-1).event, 'end');
   });
 
+  await t.test('an error of who handles comes out, and what it was given is not lost', async () => {
+    const job = await finishedJob(server, small(33, 8));
+    const url = `${server.url}/v1/jobs/${job.id}/events`;
+    for (const fails of [() => { throw new Error('of the page'); }, () => Promise.reject(new Error('of the page'))]) {
+      const seen = [];
+      let failed;
+      const handle = (message) => {
+        if (message.event === 'progress' || message.event === 'end') return undefined;
+        if (seen.length === 2 && failed === undefined) {
+          failed = message.id;
+          return fails();
+        }
+        return seen.push(message);
+      };
+      await assert.rejects(readStream(url, token, handle), /^Error: of the page$/);
+      assert.equal(failed, '3');
+      await readStream(`${url}?after=${seen.at(-1).id}`, token, handle);
+      assert.deepEqual(seen.map(({ data }) => JSON.parse(data)), await allEvents(server, job.id), 'each once');
+    }
+  });
+
   await t.test('it says what asking again cannot mend, and ends when it is told to', async () => {
     const { id } = await submit(server, endless(3));
     await assert.rejects(readStream(`${server.url}/v1/jobs/${id}/events`, 'colony_wrong', assert.fail), /^Error: 401: /);

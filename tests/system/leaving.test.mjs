@@ -67,6 +67,8 @@ test('damaged data is a 500 whose reason stands in the log', async (t) => {
   for (const path of ['cells', 'series']) {
     const response = await send(server.port, 'GET', `/v1/jobs/${job.id}/${path}`, { headers: { 'X-Request-Id': `ask-${path}` } });
     assert.equal(response.status, 500);
+    assert.deepEqual([response.json.detail, response.json.errors], ["the server's log has more under this request_id", undefined]);
+    assert.equal(response.json.request_id, `ask-${path}`);
     const failure = await eventually('its line', () => logged(server).find(({ event, request_id }) => event === 'failure' && request_id === `ask-${path}`));
     assert.equal(failure.level, 'error');
     assert.match(failure.message, new RegExp(`job ${job.id} does not fold at event ${job.last_seq}\\b`));

@@ -1,7 +1,7 @@
 // races: what happens at the same time comes to one result. Rounds are many and short; none waits for a moment, the moments are where they fall.
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import { allEvents, command, endless, show, small, submit, terminal } from './harness/jobs.mjs';
+import { allEvents, command, endless, finishedJob, show, small, submit, terminal } from './harness/jobs.mjs';
 import { full, startServer } from './harness/server.mjs';
 import { openStream } from './harness/stream.mjs';
 import { eventually, seeded } from './harness/wait.mjs';
@@ -35,6 +35,28 @@ test('submissions at once with one Idempotency-Key', async (t) => {
       assert.equal(await total(server), before + 1);
     }
   });
+});
+
+test('an edit and a deletion at once with one If-Match: one is done, and the other told so', async (t) => {
+  const server = await startServer(t);
+  const rounds = full ? 300 : 40;
+  const outcomes = {};
+  for (let round = 0; round < rounds; ++round) {
+    const { id } = await finishedJob(server, small(round, 1));
+    const { etag } = (await server.get(`/v1/jobs/${id}`)).headers;
+    const [edit, removal] = await Promise.all([
+      server.request('PATCH', `/v1/jobs/${id}`, {
+        headers: { 'Content-Type': 'application/merge-patch+json', 'If-Match': etag },
+        body: '{"labels":{"keep":"true"}}',
+      }),
+      server.request('DELETE', `/v1/jobs/${id}`, { headers: { 'If-Match': etag } }),
+    ]);
+    const outcome = `${edit.status} ${removal.status}`;
+    assert.ok(['200 412', '404 204'].includes(outcome), `round ${round}: ${outcome}`);
+    assert.equal((await server.get(`/v1/jobs/${id}`)).status, edit.status, 'what was kept is there');
+    outcomes[outcome] = (outcomes[outcome] ?? 0) + 1;
+  }
+  t.diagnostic(JSON.stringify(outcomes));
 });
 
 test('a cancel while the watcher reconnects is not lost', async (t) => {

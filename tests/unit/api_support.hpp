@@ -58,6 +58,7 @@ class FakeJobs : public JobService {
   std::vector<NewJob> submitted;
   std::map<std::string, std::string> keys;  // idempotency key to body hash
   std::optional<Error> next_error;          // answered by the next command or submission
+  std::function<void()> before_acting;      // what others do just before a command or removal
   std::function<void()> waker;
   std::function<void(const JobNews&)> hearer;  // of the last follow()
   std::optional<std::int64_t> followed_key;
@@ -133,13 +134,19 @@ class FakeJobs : public JobService {
     return Page{{view()}, cursor.empty() ? std::optional<std::string>("a cursor&") : std::nullopt};
   }
   Result<std::vector<std::uint64_t>> counts() override { return std::vector<std::uint64_t>{1, 2, 3, 4, 5, 6}; }
-  Result<Commanded> cancel(const std::string& id, const std::string& actor) override { return command(id, actor); }
-  Result<Commanded> pause(const std::string& id, const std::string& actor) override { return command(id, actor); }
-  Result<Commanded> resume(const std::string& id, const std::string& actor) override { return command(id, actor); }
-  Status remove(const std::string& id) override {
-    const auto done = command(id, {});
+  Result<Commanded> cancel(const std::string& id, const std::string& actor, const RevisionCondition& condition) override {
+    return command(id, actor, condition);
+  }
+  Result<Commanded> pause(const std::string& id, const std::string& actor, const RevisionCondition& condition) override {
+    return command(id, actor, condition);
+  }
+  Result<Commanded> resume(const std::string& id, const std::string& actor, const RevisionCondition& condition) override {
+    return command(id, actor, condition);
+  }
+  Result<Removed> remove(const std::string& id, const RevisionCondition& condition) override {
+    const auto done = command(id, {}, condition);
     if (!done) return done.error();
-    return Ok{};
+    return Removed{done->view.job, done->is_current};
   }
   Result<std::vector<Event>> events(const std::string& id, const EventFilter& filter, std::size_t limit) override {
     if (id != row.id) return missing(id);
@@ -153,13 +160,13 @@ class FakeJobs : public JobService {
     return out;
   }
   Result<Edited> edit(const std::string& id, const JobTextChange& change,
-                      const std::optional<std::vector<std::uint64_t>>& revisions, const std::string& actor) override {
+                      const RevisionCondition& condition, const std::string& actor) override {
     if (id != row.id) return missing(id);
     asked_change = change;
-    asked_revisions = revisions;
+    asked_revisions = condition.one_of;
     asked_actor = actor;
     if (next_error) return *std::exchange(next_error, std::nullopt);
-    const bool fits = !revisions || std::find(revisions->begin(), revisions->end(), row.revision) != revisions->end();
+    const bool fits = condition.holds(row.revision);
     if (fits) ++row.revision;
     return Edited{view(), fits, fits};
   }
@@ -231,9 +238,11 @@ class FakeJobs : public JobService {
   std::string folder_;
 
   static Error missing(const std::string& id) { return {ErrorCode::kNotFound, "there is no job '" + id + "'"}; }
-  Result<Commanded> command(const std::string& id, const std::string& actor) {
-    last_actor = actor;
+  Result<Commanded> command(const std::string& id, const std::string& actor, const RevisionCondition& condition) {
     if (id != row.id) return missing(id);
+    if (before_acting) before_acting();
+    if (!condition.holds(row.revision)) return Commanded{view(), false, false};
+    last_actor = actor;
     if (next_error) return *std::exchange(next_error, std::nullopt);
     return Commanded{view(), true};
   }

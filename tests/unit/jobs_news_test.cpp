@@ -42,11 +42,11 @@ TEST_F(JobsTest, FollowersOfAllHearEveryJobFromItsBeginningToItsEnd) {
   EXPECT_GE(count(key_a, Kind::kCommit), 1);
   EXPECT_GE(count(key_b, Kind::kChange), 3);
   const int before = count(key_b, Kind::kChange);
-  const auto edited = service_->edit(b, named("renamed"), std::nullopt, "alice");
+  const auto edited = service_->edit(b, named("renamed"), {}, "alice");
   ASSERT_TRUE(edited) << edited.error().message;
   EXPECT_EQ(edited->view.job.name, "renamed");
   EXPECT_EQ(count(key_b, Kind::kChange), before + 1);
-  EXPECT_FALSE(service_->edit(b, named("renamed"), std::nullopt, "alice")->changed);
+  EXPECT_FALSE(service_->edit(b, named("renamed"), {}, "alice")->changed);
   EXPECT_EQ(count(key_b, Kind::kChange), before + 1) << "no change, no news";
   ASSERT_TRUE(service_->remove(b));
   EXPECT_EQ(count(key_b, Kind::kRemoved), 1);

@@ -75,7 +75,7 @@ TEST_F(Retention, WhatIsKeptTakesNoRoomFromTheOthers) {
   ASSERT_EQ(gone, std::vector<std::size_t>{0});  // two that may go, beside one that is kept
   JobTextChange change;
   change.labels["keep"] = "true";
-  ASSERT_TRUE(service_->edit(ids_[2], change, std::nullopt, "tester"));
+  ASSERT_TRUE(service_->edit(ids_[2], change, {}, "tester"));
   EXPECT_EQ(round({0, bytes / 2 + 8192}, now_ms()), std::vector<std::size_t>{}) << "one is left that may go, and it fits";
 }
 

@@ -23,12 +23,12 @@ http::Response answer(const std::string& body) {
 }
 
 TEST(Kept, ThoseUsedLastStayWithinTheBound) {
-  api::KeptAnswers kept(100);
+  api::KeptAnswers kept(100, 10);
   EXPECT_FALSE(kept.find("\"a\""));
-  kept.keep("\"a\"", answer(std::string(40, 'a')));
-  kept.keep("\"b\"", answer(std::string(40, 'b')));
+  kept.keep("\"a\"", {}, answer(std::string(40, 'a')));
+  kept.keep("\"b\"", {}, answer(std::string(40, 'b')));
   ASSERT_TRUE(kept.find("\"a\"")) << "now used last";
-  kept.keep("\"c\"", answer(std::string(40, 'c')));
+  kept.keep("\"c\"", {}, answer(std::string(40, 'c')));
   EXPECT_FALSE(kept.find("\"b\""));
   const auto found = kept.find("\"a\"");
   ASSERT_TRUE(found && kept.find("\"c\""));
@@ -37,15 +37,42 @@ TEST(Kept, ThoseUsedLastStayWithinTheBound) {
   EXPECT_EQ(header(*found, "Content-Type"), "image/png");
   EXPECT_EQ(header(*found, "ETag"), "\"a\"");
   EXPECT_EQ(header(*found, "Cache-Control"), "private, no-cache");
-  kept.keep("\"large\"", answer(std::string(101, 'l')));
+  kept.keep("\"large\"", {}, answer(std::string(101, 'l')));
   EXPECT_FALSE(kept.find("\"large\""));
   EXPECT_TRUE(kept.find("\"a\"") && kept.find("\"c\"")) << "not thrown out for what is not kept";
-  kept.keep("\"a\"", answer(std::string(40, 'a')));  // two made it at once
-  kept.keep("\"d\"", answer(std::string(20, 'd')));
+  kept.keep("\"a\"", {}, answer(std::string(40, 'a')));  // two made it at once
+  kept.keep("\"d\"", {}, answer(std::string(20, 'd')));
   EXPECT_TRUE(kept.find("\"a\"") && kept.find("\"c\"") && kept.find("\"d\"")) << "counted once: 100 bytes";
-  kept.keep("\"all\"", answer(std::string(100, 'e')));
+  kept.keep("\"all\"", {}, answer(std::string(100, 'e')));
   EXPECT_TRUE(kept.find("\"all\""));
   EXPECT_FALSE(kept.find("\"d\""));
+}
+
+TEST(Kept, AreSoManyAtMostHoweverSmall) {
+  api::KeptAnswers kept(1000, 3);
+  const auto tag = [](int number) { return '"' + std::to_string(number) + '"'; };
+  for (int i = 0; i < 100; ++i) {
+    kept.keep(tag(i), {}, answer(i % 2 == 0 ? "" : "x"));
+    EXPECT_TRUE(kept.find(tag(0))) << "used last, each time";
+  }
+  EXPECT_TRUE(kept.find(tag(99)) && kept.find(tag(98)));
+  EXPECT_FALSE(kept.find(tag(97)));
+}
+
+TEST(Kept, WhatWasMadeOfSomethingGoesWithIt) {
+  api::KeptAnswers kept(100, 10);
+  kept.keep("\"step\"", {"analysis"}, answer(std::string(40, 's')));
+  kept.keep("\"figure\"", {"comparison", "analysis"}, answer(std::string(40, 'f')));
+  kept.keep("\"other\"", {"another"}, answer(std::string(20, 'o')));
+  kept.drop("comparison");
+  EXPECT_FALSE(kept.find("\"figure\""));
+  EXPECT_TRUE(kept.find("\"step\"") && kept.find("\"other\""));
+  kept.keep("\"figure\"", {"comparison", "analysis"}, answer(std::string(40, 'f')));
+  kept.drop("analysis");
+  EXPECT_FALSE(kept.find("\"figure\"") || kept.find("\"step\""));
+  kept.drop("never there");
+  kept.keep("\"large\"", {}, answer(std::string(80, 'l')));
+  EXPECT_TRUE(kept.find("\"large\"") && kept.find("\"other\"")) << "its bytes went, too: there is room for 80";
 }
 
 /// The server is told to end: whatever still has to be made is now 503. So what is not is an answer without work.

@@ -79,8 +79,13 @@ TEST(Meta, HealthNeedsNoWorker) {
 }
 
 TEST(Meta, AProblemOf500SaysWhyToTheLogAlone) {
-  const Error error{ErrorCode::kInternal, "event 7 of job j is not there"};
-  EXPECT_EQ(api::problem_response(error, "id").failure, error.message);
+  const Error error{ErrorCode::kInternal, "check failed: event.digest == digest at engine/colony.cpp:77", {{"/secret", "field"}}};
+  const auto response = api::problem_response(error, "id-7");
+  EXPECT_EQ(response.failure, error.message);
+  EXPECT_EQ(response.body.find("check failed"), std::string::npos) << response.body;
+  EXPECT_EQ(response.body.find("/secret"), std::string::npos) << response.body;
+  EXPECT_NE(response.body.find("the server's log has more under this request_id"), std::string::npos) << response.body;
+  EXPECT_NE(response.body.find("id-7"), std::string::npos);
   EXPECT_EQ(api::problem_response({ErrorCode::kStorage, "the disk is full"}, "id").failure, "") << "an operator's matter, and no bug";
 }
 

@@ -38,7 +38,7 @@ class StoreEditTest : public testing::Test {
   }
   Store::TextUpdated update(std::int64_t key, const JobTextChange& change,
                             const std::optional<std::vector<std::uint64_t>>& revisions = {}) {
-    const auto updated = store_->update_job_text(key, change, revisions, "alice");
+    const auto updated = store_->update_job_text(key, change, {revisions, {}}, "alice");
     EXPECT_TRUE(updated) << updated.error().message;
     return *updated;
   }
@@ -103,14 +103,14 @@ TEST_F(StoreEditTest, AnotherRevisionOrTooManyLabelsChangeNothing) {
   EXPECT_FALSE(refused.is_current) << "a condition that names no revision is never met";
   change.labels = {{"third", "x"}};
   change.labels_max = 2;
-  const auto error = store_->update_job_text(job.job_key, change, std::nullopt, "alice");
+  const auto error = store_->update_job_text(job.job_key, change, {}, "alice");
   ASSERT_FALSE(error);
   EXPECT_EQ(error.error().code, ErrorCode::kInvalid);
   EXPECT_EQ(error.error().fields.at(0).pointer, "/labels");
   EXPECT_EQ(store_->find_job(job.job_key)->name, "before");
   EXPECT_EQ(store_->find_job(job.job_key)->revision, job.revision);
   EXPECT_TRUE(update(job.job_key, named("after"), std::vector<std::uint64_t>{5, job.revision}).changed);
-  EXPECT_EQ(store_->update_job_text(77, change, std::nullopt, "alice").error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(store_->update_job_text(77, change, {}, "alice").error().code, ErrorCode::kNotFound);
 }
 
 TEST_F(StoreEditTest, OfManyWithOneRevisionOneWins) {
@@ -121,13 +121,56 @@ TEST_F(StoreEditTest, OfManyWithOneRevisionOneWins) {
     threads.emplace_back([&, i] {
       JobTextChange change;
       change.name = "by " + std::to_string(i);
-      const auto done = store_->update_job_text(job.job_key, change, std::vector<std::uint64_t>{job.revision}, "x");
+      const auto done = store_->update_job_text(job.job_key, change, {std::vector<std::uint64_t>{job.revision}, {}}, "x");
       if (done && done->is_current) ++won;
     });
   }
   for (std::thread& thread : threads) thread.join();
   EXPECT_EQ(won, 1);
   EXPECT_EQ(store_->find_job(job.job_key)->revision, job.revision + 1);
+}
+
+// What was changed after somebody looked is not deleted, nor commanded, by what they saw: the revision is compared in the transaction.
+TEST_F(StoreEditTest, ADeletionOrACommandWithAnotherRevisionDoesNothing) {
+  const JobRow job = create();
+  const RevisionCondition as_seen{std::vector<std::uint64_t>{job.revision}, {}}, but_this{std::nullopt, {job.revision + 1}};
+  ASSERT_TRUE(update(job.job_key, named("after")).changed);
+  for (const RevisionCondition& condition : {as_seen, but_this, RevisionCondition{std::vector<std::uint64_t>{}, {}}}) {
+    for (const JobCommand what : {JobCommand::kPause, JobCommand::kResume, JobCommand::kCancel}) {
+      const auto commanded = store_->command_job(job.job_key, what, "x", condition);
+      ASSERT_TRUE(commanded);
+      EXPECT_FALSE(commanded->is_current || commanded->changed || commanded->pending);
+      EXPECT_EQ(commanded->job.revision, job.revision + 1);
+    }
+    EXPECT_FALSE(store_->delete_job(job.job_key, condition)->is_current) << "before its state is looked at";
+  }
+  EXPECT_EQ(store_->find_job(job.job_key)->state, JobState::kQueued);
+  const RevisionCondition now{std::vector<std::uint64_t>{99, job.revision + 1}, {job.revision}};
+  const auto cancelled = store_->command_job(job.job_key, JobCommand::kCancel, "x", now);
+  ASSERT_TRUE(cancelled && cancelled->changed && cancelled->is_current);
+  EXPECT_FALSE(store_->delete_job(job.job_key, now)->is_current);
+  EXPECT_EQ(store_->find_job(job.job_key)->state, JobState::kCancelled) << "still there";
+  const auto deleted = store_->delete_job(job.job_key, {std::vector<std::uint64_t>{cancelled->job.revision}, {}});
+  ASSERT_TRUE(deleted && deleted->is_current);
+  EXPECT_EQ(store_->find_job(job.job_key).error().code, ErrorCode::kNotFound);
+}
+
+TEST_F(StoreEditTest, OfAnEditAndADeletionWithOneRevisionOneIsDone) {
+  for (int round = 0; round < 50; ++round) {
+    JobRow job = create();
+    job = store_->command_job(job.job_key, JobCommand::kCancel)->job;
+    const RevisionCondition as_seen{std::vector<std::uint64_t>{job.revision}, {}};
+    bool is_edited = false, is_deleted = false;
+    std::thread editor([&] {
+      const auto done = store_->update_job_text(job.job_key, named("kept"), as_seen, "x");
+      is_edited = done && done->is_current;
+    });
+    const auto deleted = store_->delete_job(job.job_key, as_seen);
+    is_deleted = deleted && deleted->is_current;
+    editor.join();
+    EXPECT_NE(is_edited, is_deleted);
+    EXPECT_EQ(static_cast<bool>(store_->find_job(job.job_key)), is_edited);
+  }
 }
 
 // A runner's batches write the row too: they must not bring the old text back.

@@ -83,8 +83,8 @@ TEST(Tokens, TheSchemaStatesTheRangeThatIsChecked) {
 // Where tokens are needed somebody must be able to make one.
 TEST(Tokens, TheLastValidAdminStays) {
   ApiFixture api;
-  const auto make = [&](const char* scope) {
-    http::Response made = api.post("/v1/tokens", R"({"name": "x", "expires_h": 1, "scope": ")" + std::string(scope) + "\"}");
+  const auto make = [&](const char* scope, double expires_h = 2.0) {
+    http::Response made = api.post("/v1/tokens", api::to_text({{"name", "x"}, {"expires_h", expires_h}, {"scope", scope}}));
     return json_of(made)["id"].get<std::string>();
   };
   const std::string first = make("admin");
@@ -99,6 +99,12 @@ TEST(Tokens, TheLastValidAdminStays) {
   EXPECT_TRUE(api.tokens.is_alive(first, http::unix_time_ms()));
   EXPECT_EQ(api.ask("DELETE", "/v1/tokens/" + reader).status, 204);
   EXPECT_EQ(api.ask("DELETE", "/v1/tokens/made-up").status, 404);
+  for (const double soon_over_h : {api::kTokenLifeMin_h, 0.99}) {
+    make("admin", soon_over_h);
+    refused = api.ask("DELETE", "/v1/tokens/" + first);
+    EXPECT_EQ(refused.status, 409) << "one that is over in " << soon_over_h << " h is nobody to leave the server to";
+    EXPECT_THAT(refused.body, HasSubstr("at least " + std::to_string(api::kSpareAdminLife_h) + " h more"));
+  }
   const std::string second = make("admin");
   EXPECT_EQ(api.ask("DELETE", "/v1/tokens/" + first).status, 204);
   EXPECT_EQ(api.ask("DELETE", "/v1/tokens/" + second).status, 409);
