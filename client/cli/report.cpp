@@ -212,7 +212,7 @@ std::string page_head(const std::string& title) {
 std::string shape_section(const Json& analysis) {
   const std::optional<double> um_per_px = scale_of(analysis);
   std::string rows;
-  for (const auto& [member, title] : {std::pair("colony", "colony"), std::pair("apart", "cells apart"), std::pair("packing", "packing"),
+  for (const auto& [member, title] : {std::pair("colony", "colony"), std::pair("apart", "cells without a neighbour"), std::pair("packing", "packing"),
                                       std::pair("sibling_straightness", "straightness of borders")}) {
     if (analysis.at(member).is_object()) add_facts(analysis.at(member), title, um_per_px, rows);
   }

@@ -18,9 +18,9 @@ struct Title {
 /// Where the name without its unit and underscores is no title.
 constexpr Title kTitles[] = {
     {"at_frame", "cut by the frame"},
-    {"apart_area_cv", "cells apart: variation of the area"},
-    {"apart_circularity_sd", "cells apart: sd of the circularity"},
-    {"apart_count", "cells apart"},
+    {"apart_area_cv", "variation of their area"},
+    {"apart_circularity_sd", "sd of their circularity"},
+    {"apart_count", "number"},
     {"area_mean_px", "mean area"},
     {"area_mean_um2", "mean area"},
     {"area_median_px", "median area"},
@@ -47,8 +47,8 @@ constexpr Title kTitles[] = {
     {"most_pressed_cell_id", "most pressed cell, id"},
     {"object_count", "objects"},
     {"open_share", "open share of the hull"},
-    {"other_area_cv", "other cells: variation of the area"},
-    {"other_circularity_sd", "other cells: sd of the circularity"},
+    {"other_area_cv", "variation of the others' area"},
+    {"other_circularity_sd", "sd of the others' circularity"},
     {"other_count", "others"},
     {"p_value", "p"},
     {"partly_hidden_count", "cells seen by less than half, not measured"},

@@ -157,8 +157,8 @@ std::string sides_reason(const LabelReport& report) {
   if (report.visible_count < kObjectsMin) return "fewer than " + std::to_string(kObjectsMin) + " cells are seen";
   const std::uint64_t hidden = report.cell_count - report.visible_count;
   if (hidden == 0 && static_cast<double>(report.partly_hidden_count) <= kSheetHiddenMax * static_cast<double>(report.visible_count)) return {};
-  return "the table is of a sheet, in which every cell is seen: of " + counted(report.cell_count, report.objects) + " here " + std::to_string(hidden) +
-         (hidden == 1 ? " is" : " are") + " hidden and " + std::to_string(report.partly_hidden_count) + " by more than half";
+  return "the table is of a sheet, in which every cell is seen: of " + counted(report.cell_count, report.objects) + " here " + (hidden == 0 ? std::string("none") : std::to_string(hidden)) +
+         (hidden <= 1 ? " is" : " are") + " hidden, and " + std::to_string(report.partly_hidden_count) + (report.partly_hidden_count == 1 ? " is" : " are") + " by more than half";
 }
 
 }  // namespace
