@@ -11,6 +11,7 @@
 #include "client/cli/output.hpp"
 #include "client/cli/problem.hpp"
 #include "client/cli/report.hpp"
+#include "client/cli/report_facts.hpp"
 
 namespace colony::client {
 namespace {
@@ -55,33 +56,36 @@ ExitCode fetch_mesh(Session& session, const FileOptions& options) {
   return fetch_file(session, target, "model/gltf-binary", options.output);
 }
 
-/// A dimension as "1.62 (se 0.01, 3..120 px)", or why there is none.
+/// A dimension as "1.62 (se 0.01, boxes of 3 to 120 px, a crossover, not scaling)", or why there is none.
 std::string line_text(const Json& line) {
   const Json& d0 = line.at("d0");
   if (d0.is_null()) return "none: " + printable(line.at("reason").get<std::string>());
-  const Json& crossover = line.at("crossover");  // of a sweep's row the finding itself
-  const bool is_crossover = crossover.is_object() ? crossover.at("found").get<bool>() : crossover.get<bool>();
+  const std::string finding = finding_text(line.value("finding", ""));
   return member_text(d0, "value") + " (se " + member_text(d0, "se", 3) + ", boxes of " + d0.at("range_px")[0].dump() + " to " +
-         d0.at("range_px")[1].dump() + " px" + (is_crossover ? ", a crossover)" : ")");
+         d0.at("range_px")[1].dump() + " px" + (finding.empty() ? ")" : ", " + finding + ")");
 }
 
-void print_lines(std::ostream& out, const Json& measured) {
-  out << "walls D0    " << line_text(measured.at("fractal").at("walls")) << '\n';
-  out << "outline D0  " << line_text(measured.at("fractal").at("outline")) << '\n';
+void print_lines(std::ostream& out, const Json& measured, const KindNames& names) {
+  out << names.walls << ": D0 " << line_text(measured.at("fractal").at("walls")) << '\n';
+  out << names.outline << ": D0 " << line_text(measured.at("fractal").at("outline")) << '\n';
   for (const Json& control : measured.at("controls")) {
-    out << "  control " << printable(control.at("name").get<std::string>()) << ": walls " << line_text(control.at("walls")) << '\n';
+    out << "  control " << printable(control.at("name").get<std::string>()) << ": D0 " << line_text(control.at("walls")) << '\n';
   }
 }
 
-void print_verdict(std::ostream& out, const Json& measured) {
-  for (const Json& sentence : measured.at("verdict")) out << "- " << printable(sentence.get<std::string>()) << '\n';
+/// But for `told`, which was printed before.
+void print_verdict(std::ostream& out, const Json& measured, const std::string& told = {}) {
+  for (const Json& sentence : measured.at("verdict")) {
+    if (told.empty() || sentence != told) out << "- " << printable(sentence.get<std::string>()) << '\n';
+  }
 }
 
 /// The dimensions against the threshold, a line each.
-void print_sweep(std::ostream& out, const Json& measured) {
+void print_sweep(std::ostream& out, const Json& measured, const KindNames& names) {
+  out << "against the threshold, in one grid from the frame's corner (the answer's grid begins at what is counted: at its threshold the two differ a little)\n";
   for (const Json& row : measured.at("threshold_sweep").at("rows")) {
-    out << "  threshold " << row.at("threshold").dump() << ": walls " << line_text(row.at("walls")) << ", outline "
-        << line_text(row.at("outline")) << '\n';
+    out << "  threshold " << row.at("threshold").dump() << ": " << names.walls << " D0 " << line_text(row.at("walls")) << ", " << names.outline
+        << " D0 " << line_text(row.at("outline")) << '\n';
   }
 }
 
@@ -100,8 +104,11 @@ ExitCode measure(Session& session, const FileOptions& options) {
     return ExitCode::kDone;
   }
   const Json measured = body_json(response);
-  session.env.out << member_text(measured, "cell_count") << " cells at " << member_text(measured, "time_h") << " h\n";
-  print_lines(session.env.out, measured);
+  const auto all = measured.at("cell_count").get<std::uint64_t>(), seen = measured.at("visible_cell_count").get<std::uint64_t>();
+  session.env.out << counted_text(all, "cell", "cells") << " at " << member_text(measured, "time_h") << " h";
+  if (seen < all) session.env.out << ", " << seen << " of them seen from above";
+  session.env.out << '\n';
+  print_lines(session.env.out, measured, kind_names("cells"));
   print_verdict(session.env.out, measured);
   return ExitCode::kDone;
 }
@@ -218,8 +225,9 @@ ExitCode analyze(Session& session, const AnalyzeOptions& options) {
   }
   const Json& result = row.at("result");
   const Json& segmentation = result.at("segmentation");
+  const KindNames names = kind_names(result.value("object_kind", ""));
   out << "analysis " << row.at("id").get<std::string>() << '\n'
-      << member_text(segmentation, "object_count") << " objects (" << printable(member_text(segmentation, "pipeline")) << ", threshold "
+      << counted_text(result.at("object_count").get<std::uint64_t>(), names.one, names.many) << " (" << printable(member_text(segmentation, "pipeline")) << ", threshold "
       << member_text(segmentation, "threshold") << "), mean area " << member_text(segmentation, "area_mean_px", 1) << " px, "
       << member_text(segmentation, "foreground_share", 3) << " of the field covered\n"
       << "pipeline " << printable(member_text(segmentation, "pipeline")) << ", "
@@ -228,9 +236,12 @@ ExitCode analyze(Session& session, const AnalyzeOptions& options) {
       << printable(segmentation.at("foreground_reason").get<std::string>()) << '\n'
       << scale_text(result.at("image")) << '\n';
   for (const Json& note : result.at("image").at("notes")) out << "note: " << printable(note.get<std::string>()) << '\n';
-  print_lines(out, result);
-  print_sweep(out, result);
-  print_verdict(out, result);
+  const Json doubt = segmentation.value("doubt", Json());
+  const std::string told = doubt.is_string() ? doubt.get<std::string>() : "";
+  if (!told.empty()) out << printable(told) << '\n';
+  print_lines(out, result, names);
+  print_sweep(out, result, names);
+  print_verdict(out, result, told);
   return ExitCode::kDone;
 }
 
@@ -267,9 +278,10 @@ ExitCode compare(Session& session, const CompareOptions& options) {
   const Json& result = row.at("result");
   session.env.out << "comparison " << row.at("id").get<std::string>() << '\n';
   for (const char* side : {"simulated", "real"}) {
-    session.env.out << side << ", " << member_text(result.at(side), "object_count") << ' ' << printable(member_text(result.at(side), "object_kind"))
-                    << " of " << member_text(result.at(side), "object_area_mean_px", 0) << " px\n";
-    print_lines(session.env.out, result.at(side));
+    const KindNames names = kind_names(result.at(side).at("object_kind").get<std::string>());
+    session.env.out << side << ", " << counted_text(result.at(side).at("object_count").get<std::uint64_t>(), names.one, names.many) << " of "
+                    << member_text(result.at(side), "object_area_mean_px", 0) << " px\n";
+    print_lines(session.env.out, result.at(side), names);
   }
   print_verdict(session.env.out, result);
   return ExitCode::kDone;

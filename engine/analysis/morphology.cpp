@@ -60,6 +60,7 @@ class Collector {
     shape.label = areas_[i].label;
     shape.area_px = sums.count;
     shape.at_frame = sums.at_frame;
+    shape.is_measured = shape.area_px >= kShapePxMin;
     const auto n = static_cast<double>(sums.count);
     const double mean_x = static_cast<double>(sums.x) / n, mean_y = static_cast<double>(sums.y) / n;
     shape.centre_x_px = mean_x + 0.5;

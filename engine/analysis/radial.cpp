@@ -56,7 +56,7 @@ Result<std::vector<Ring>> radial_profile(const LabelImage& labels, const std::ve
   for (const Shape& shape : shapes) {
     const std::size_t ring = std::min(ring_of(distance(shape.centre_x_px, shape.centre_y_px)), rings.size() - 1);
     ++rings[ring].cell_count;
-    areas[ring].push_back(static_cast<double>(shape.area_px));
+    if (shape.is_measured) areas[ring].push_back(static_cast<double>(shape.area_px));
     if (active && std::binary_search(active->begin(), active->end(), shape.label)) ++active_counts[ring];
   }
   for (std::int64_t row = 0; row < labels.height_px; ++row) {
@@ -72,7 +72,7 @@ Result<std::vector<Ring>> radial_profile(const LabelImage& labels, const std::ve
     const Spread spread = spread_of(areas[i]);
     const auto n = static_cast<double>(rings[i].cell_count);
     rings[i].area_mean_px = spread.mean;
-    if (rings[i].cell_count > 1) rings[i].area_se_px = spread.sd / std::sqrt(n);
+    if (areas[i].size() > 1) rings[i].area_se_px = spread.sd / std::sqrt(static_cast<double>(areas[i].size()));
     if (rings[i].covered_px > 0) rings[i].density_per_px = n / static_cast<double>(rings[i].covered_px);
     if (active && rings[i].cell_count > 0) rings[i].active_share = static_cast<double>(active_counts[i]) / n;
   }
@@ -82,9 +82,12 @@ Result<std::vector<Ring>> radial_profile(const LabelImage& labels, const std::ve
 ApartCells apart_cells(const std::vector<Shape>& shapes, const Contacts& contacts) {
   CHECK(shapes.size() == contacts.cells.size());
   std::vector<double> areas[2], circularities[2];
+  std::uint64_t counts[2] = {0, 0};
   for (std::size_t i = 0; i < shapes.size(); ++i) {
     CHECK(shapes[i].label == contacts.cells[i].label);
     const std::size_t group = contacts.cells[i].neighbour_count == 0 ? 0 : 1;
+    ++counts[group];
+    if (!shapes[i].is_measured) continue;
     areas[group].push_back(static_cast<double>(shapes[i].area_px));
     circularities[group].push_back(shapes[i].circularity);
   }
@@ -93,9 +96,9 @@ ApartCells apart_cells(const std::vector<Shape>& shapes, const Contacts& contact
     return spread.mean > 0.0 ? spread.sd / spread.mean : 0.0;
   };
   ApartCells result;
-  result.apart_count = areas[0].size();
-  result.other_count = areas[1].size();
-  if (!shapes.empty()) result.share = static_cast<double>(areas[0].size()) / static_cast<double>(shapes.size());
+  result.apart_count = counts[0];
+  result.other_count = counts[1];
+  if (!shapes.empty()) result.share = static_cast<double>(counts[0]) / static_cast<double>(shapes.size());
   result.apart_area_cv = variation(areas[0]);
   result.apart_circularity_sd = spread_of(circularities[0]).sd;
   result.other_area_cv = variation(areas[1]);

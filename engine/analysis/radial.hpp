@@ -1,6 +1,6 @@
 // radial: how size, density and activity of cells change from the middle of a colony to its rim, and how cells that stand apart differ.
 // Method:  rings of equal width about the centre of all labelled pixels, up to the farthest cell centre. A cell belongs to the ring of its
-//          centre; the covered area of a ring is that of labelled pixels in it. Pixels
+//          centre; the covered area of a ring is that of labelled pixels in it. Means of area and shape are over Shape::is_measured. Pixels
 //          farther out than the farthest centre, the outer halves of the outermost cells, are in no ring: a ring of halves would have no density.
 // Units:   pixels.
 // Errors:  kInvalid: `ring_count` outside 1..200; cells that are not those of the image.
@@ -19,7 +19,7 @@ struct Ring {
   double inner_px = 0.0, outer_px = 0.0;
   std::uint64_t cell_count = 0;
   std::uint64_t covered_px = 0;
-  double area_mean_px = 0.0;              // of a cell; 0 in a ring without cells
+  double area_mean_px = 0.0;              // of a measured cell; 0 in a ring without
   double area_se_px = 0.0;                // standard error of that mean; 0 below 2 cells
   double density_per_px = 0.0;            // cells / covered area
   std::optional<double> active_share = {};  // none without cells, or where activity is not known

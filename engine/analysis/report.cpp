@@ -3,7 +3,6 @@
 #include <cmath>
 
 #include "engine/analysis/contour.hpp"
-#include "engine/analysis/controls.hpp"
 #include "engine/analysis/reason.hpp"
 #include "engine/base/check.hpp"
 #include "engine/base/maths.hpp"
@@ -53,6 +52,11 @@ std::vector<std::string> sentences_of(const LineFindings& findings) {
   return sentences;
 }
 
+void set_object_count(std::uint64_t count, LineReport& lines, std::vector<ControlReport>& controls) {
+  lines.walls.object_count = lines.outline.object_count = count;
+  for (ControlReport& control : controls) control.lines.walls.object_count = control.lines.outline.object_count = count;
+}
+
 LineReport analyse_lines(const LabelImage& labels, std::int64_t gap_px, const BoxOptions& boxes, StopFlag stop) {
   LineReport report;
   report.walls = measure_line(cell_walls(labels), boxes, stop);
@@ -82,12 +86,12 @@ MeasuredLine up_to(const MeasuredLine& line, std::int64_t side_max_px) {
   }
   if (counts.size() < kSidesMin) {
     return {{}, "boxes up to " + std::to_string(side_max_px) + " px leave " + std::to_string(counts.size()) + " sides; at least " +
-                    std::to_string(kSidesMin) + " are needed"};
+                    std::to_string(kSidesMin) + " are needed", line.object_count};
   }
   BoxDimensions part = fit_dimensions(std::move(counts));
   part.part = all.part;
   part.foreground_px = all.foreground_px;
-  return {std::move(part), {}};
+  return {std::move(part), {}, line.object_count};
 }
 
 MatchedControls matched_controls(const LabelImage& labels, const LineReport& lines, Seed seed, const BoxOptions& boxes, StopFlag stop) {
@@ -108,8 +112,11 @@ MatchedControls matched_controls(const LabelImage& labels, const LineReport& lin
   return out;
 }
 
-std::vector<std::string> control_sentences(ObjectKind kind, double cover) {
+std::vector<std::string> control_sentences(ObjectKind kind, double cover, std::uint64_t object_count) {
   const std::string names(name_of(kind));
+  if (kind != ObjectKind::kRegions && object_count < kObjectsMin) {
+    return {"Controls of fewer than " + std::to_string(kObjectsMin) + " " + names + " show nothing: they are as few discs."};
+  }
   const std::string share = "The " + names + " cover " + decimals(cover) + " of their convex hull";
   if (cover >= kTilingCover) {
     return {share + ": they tile it, so the controls hexagonal and random_discs are as many discs of their size packed together."};
@@ -120,15 +127,66 @@ std::vector<std::string> control_sentences(ObjectKind kind, double cover) {
               (kind == ObjectKind::kCells ? "cells" : "of them") + " share."};
 }
 
+namespace {
+
+std::string counted(std::uint64_t count, ObjectKind kind) {
+  return std::to_string(count) + " " + std::string(count == 1 ? singular_of(kind) : name_of(kind));
+}
+
+/// Counts what is seen, and takes what is mostly hidden out of the means.
+void mark_hidden(const LabelInput& input, LabelReport& report) {
+  report.visible_count = report.shapes.size();
+  report.cell_count = input.whole ? input.whole->size() : report.visible_count;
+  std::size_t at = 0;
+  for (Shape& shape : report.shapes) {
+    if (input.whole) {
+      while (at < input.whole->size() && (*input.whole)[at].label < shape.label) ++at;
+      CHECK(at < input.whole->size() && (*input.whole)[at].label == shape.label);
+      if (static_cast<double>(shape.area_px) < kSeenShareMin * static_cast<double>((*input.whole)[at].area_px)) {
+        ++report.partly_hidden_count;
+        shape.is_measured = false;
+      }
+    }
+    report.measured_count += shape.is_measured ? 1 : 0;
+  }
+}
+
+/// Sides are those of cells of a sheet: empty, or why these are not.
+std::string sides_reason(const LabelReport& report) {
+  if (report.objects != ObjectKind::kCells) return "the table is of cells, and these are " + std::string(name_of(report.objects));
+  if (report.visible_count < kObjectsMin) return "fewer than " + std::to_string(kObjectsMin) + " cells are seen";
+  const std::uint64_t hidden = report.cell_count - report.visible_count;
+  if (hidden == 0 && static_cast<double>(report.partly_hidden_count) <= kSheetHiddenMax * static_cast<double>(report.visible_count)) return {};
+  return "the table is of a sheet, in which every cell is seen: of " + counted(report.cell_count, report.objects) + " here " + (hidden == 0 ? std::string("none") : std::to_string(hidden)) +
+         (hidden <= 1 ? " is" : " are") + " hidden, and " + std::to_string(report.partly_hidden_count) + (report.partly_hidden_count == 1 ? " is" : " are") + " by more than half";
+}
+
+}  // namespace
+
+std::vector<std::string> hidden_sentences(const LabelReport& report) {
+  std::vector<std::string> sentences;
+  const std::uint64_t hidden = report.cell_count - report.visible_count;
+  if (hidden > 0) {
+    sentences.push_back("Of the colony's " + counted(report.cell_count, report.objects) + ", " + std::to_string(hidden) + (hidden == 1 ? " is" : " are") +
+                        " hidden under others: the figures of the picture are about the " + std::to_string(report.visible_count) + " that are seen from above.");
+  }
+  if (report.partly_hidden_count > 0) {
+    sentences.push_back("Of " + counted(report.partly_hidden_count, report.objects) + " less than half is seen: what is left of them is in no mean of size and shape.");
+  }
+  return sentences;
+}
+
 Result<LabelReport> analyse_labels(const LabelInput& input, StopFlag stop) {
   CHECK(input.labels != nullptr);
   if (const Status status = check_box_options(input.boxes); !status) return status.error();
   const LabelImage& labels = *input.labels;
   LabelReport report;
   report.um_per_px = labels.um_per_px;
+  report.objects = input.objects;
   Result<std::vector<Shape>> shapes = cell_shapes(labels, stop);
   if (!shapes) return shapes.error();
   report.shapes = std::move(*shapes);
+  mark_hidden(input, report);
   Result<Contacts> contacts = find_contacts(labels, input.gap_px, stop);
   if (!contacts) return contacts.error();
   report.contacts = std::move(*contacts);
@@ -141,8 +199,7 @@ Result<LabelReport> analyse_labels(const LabelInput& input, StopFlag stop) {
   report.sides = side_statistics(report.contacts);
   report.apart = apart_cells(report.shapes, report.contacts);
   if (input.siblings) report.siblings = sibling_straightness(report.contacts, *input.siblings);
-  report.cell_count = report.shapes.size();
-  report.cell_area_mean_px = static_cast<double>(report.colony.covered_px) / static_cast<double>(report.cell_count);
+  report.cell_area_mean_px = static_cast<double>(report.colony.covered_px) / static_cast<double>(report.visible_count);
   report.px_per_cell_diameter = 2.0 * std::sqrt(report.cell_area_mean_px / maths::kPi);
   Result<ClosedSides> closed = closed_sides(labels, report.cell_area_mean_px, input.gap_px, stop);
   if (!closed) return closed.error();
@@ -155,15 +212,18 @@ Result<LabelReport> analyse_labels(const LabelInput& input, StopFlag stop) {
   MatchedControls matched = matched_controls(labels, report.lines, input.control_seed, input.boxes, stop);
   for (ControlReport& control : matched.reports) report.controls.push_back(std::move(control));
   report.object_cover = matched.cover;
-  report.objects = input.objects;
+  if (input.objects != ObjectKind::kRegions) set_object_count(report.visible_count, report.lines, report.controls);
 
   report.findings = judge_lines(report.lines, report.controls, input.objects);
-  report.verdict = sentences_of(report.findings);
-  // Sides are those of cells: what nuclei or regions touch says nothing of Gibson's table.
-  if (input.objects == ObjectKind::kCells) {
+  report.verdict = hidden_sentences(report);
+  for (std::string& sentence : sentences_of(report.findings)) report.verdict.push_back(std::move(sentence));
+  report.sides_reason = sides_reason(report);
+  if (report.sides_reason.empty()) {
     for (std::string& sentence : judge_sides(report.sides, report.closed_sides)) report.verdict.push_back(std::move(sentence));
+  } else if (input.objects == ObjectKind::kCells) {
+    report.verdict.push_back("The sides of the cells are not held against Gibson's table: " + report.sides_reason + ".");
   }
-  for (std::string& sentence : control_sentences(input.objects, matched.cover)) report.verdict.push_back(std::move(sentence));
+  for (std::string& sentence : control_sentences(input.objects, matched.cover, report.visible_count)) report.verdict.push_back(std::move(sentence));
   return report;
 }
 

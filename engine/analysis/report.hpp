@@ -14,6 +14,7 @@
 #include <string_view>
 #include <vector>
 
+#include "engine/analysis/controls.hpp"
 #include "engine/analysis/morphology.hpp"
 #include "engine/analysis/neighbours.hpp"
 #include "engine/analysis/radial.hpp"
@@ -57,8 +58,11 @@ struct MatchedControls {
   double cover = 0.0;                     // share of their hull that the objects take; from kTilingCover on controls touch
 };
 MatchedControls matched_controls(const LabelImage& labels, const LineReport& lines, Seed seed, const BoxOptions& boxes, StopFlag stop = nullptr);
-/// What the controls are, and, where objects stand apart, that their walls are outlines.
-std::vector<std::string> control_sentences(ObjectKind kind, double cover);
+/// What the controls are, and, where objects stand apart, that their walls are outlines; below kObjectsMin objects that controls show nothing.
+std::vector<std::string> control_sentences(ObjectKind kind, double cover, std::uint64_t object_count);
+
+/// Says of lines and controls around how many single things they go: too few have no finding.
+void set_object_count(std::uint64_t count, LineReport& lines, std::vector<ControlReport>& controls);
 
 /// What follows from walls and outline, each beside the controls'.
 struct LineFindings {
@@ -71,8 +75,11 @@ std::vector<std::string> sentences_of(const LineFindings& findings);
 struct LabelReport {
   std::optional<double> um_per_px = {};
   ObjectKind objects = ObjectKind::kCells;
-  std::uint64_t cell_count = 0;           // of labels, whatever they are
-  double cell_area_mean_px = 0.0;
+  std::uint64_t cell_count = 0;           // all there are, seen or not; of a photograph those seen
+  std::uint64_t visible_count = 0;        // of labels: what all figures of the image are about
+  std::uint64_t partly_hidden_count = 0;  // of them, seen by less than kSeenShareMin: in no mean of shapes
+  std::uint64_t measured_count = 0;       // of them, the others of kShapePxMin pixels and more
+  double cell_area_mean_px = 0.0;         // covered pixels / visible_count
   double object_cover = 0.0;              // of their hull
   double px_per_cell_diameter = 0.0;      // 2 sqrt(mean area / pi): what two images are matched by
   LineReport lines;
@@ -82,6 +89,7 @@ struct LabelReport {
   Contacts contacts;
   SideStatistics sides;                   // as seen
   ClosedSides closed_sides;               // small holes given away: what Gibson's table is about
+  std::string sides_reason = {};          // why the sides are not judged by the table; empty: they are
   std::optional<SiblingStraightness> siblings = {};
   std::vector<Ring> rings;
   ApartCells apart;
@@ -89,9 +97,16 @@ struct LabelReport {
   std::vector<std::string> verdict;       // sentences
 };
 
+/// Of its own outline: a cell of which less is seen has the shape of what lies over it.
+inline constexpr double kSeenShareMin = 0.5;
+/// A picture is one of a sheet where no cell is hidden and at most this share of them is so by more than half.
+inline constexpr double kSheetHiddenMax = 0.05;
+
 struct LabelInput {
   const LabelImage* labels = nullptr;
   const LabelImage* without_noise = nullptr;  // the same colony in the same frame; none for a photograph
+  /// All cells there are, seen or not, by ascending label, with the pixels each would have alone; none for a photograph: it hides what it hides.
+  std::optional<std::vector<LabelArea>> whole = {};
   std::optional<std::vector<std::pair<std::uint32_t, std::uint32_t>>> siblings = {};
   std::optional<std::vector<std::uint32_t>> active = {};
   ObjectKind objects = ObjectKind::kCells;
@@ -100,6 +115,9 @@ struct LabelInput {
   Seed control_seed = 1;
   BoxOptions boxes = {};
 };
+
+/// How many cells are hidden, wholly or by more than half, and what that means for the figures; nothing where none is.
+std::vector<std::string> hidden_sentences(const LabelReport& report);
 
 Result<LabelReport> analyse_labels(const LabelInput& input, StopFlag stop = nullptr);
 

@@ -345,9 +345,12 @@ Result<Segmentation> segment(const GreyImage& image, const SegmentOptions& optio
     const GreyImage signal = signal_of(image, options, result, steps);
     if (steps.is_complete()) return result;
     // Where a window is constant the picture was clipped or empty: such pixels say nothing about where noise ends and cells begin.
-    const int level = options.threshold.value_or(otsu(signal, result.pipeline == Pipeline::kPhase ? kOneLevelOfDeviation : 0));
+    const int from = result.pipeline == Pipeline::kPhase ? kOneLevelOfDeviation : 0;
+    const int level = options.threshold.value_or(otsu(signal, from));
     if (level < 0) return wrong("image", "after the background is taken away nothing is left in it");
     result.threshold = level;
+    result.levels = hump_figures(signal, from);
+    if (result.levels && is_one_hump(*result.levels)) result.doubt = hump_text(*result.levels);
     throw_if_stopped(stop);
     Objects objects = objects_at(signal, level, result.pipeline, options);
     steps.add("threshold", "above level " + std::to_string(level) + (result.threshold_given ? " (given)" : " (Otsu)"),

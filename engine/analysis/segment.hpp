@@ -17,6 +17,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/analysis/hump.hpp"
 #include "engine/analysis/image.hpp"
 #include "engine/base/stop.hpp"
 
@@ -77,6 +78,8 @@ struct Segmentation {
   std::string pipeline_reason, foreground_reason;  // why these, in a sentence
   int threshold = 0;
   bool threshold_given = false;
+  std::optional<HumpFigures> levels = {};  // of the step `signal`; none for contours
+  std::string doubt = {};                  // why there may be nothing in the picture; empty: nothing says so
   std::int64_t background_reach_px = 0;  // 0: not subtracted
   std::int64_t area_min_px = 0;
   std::int64_t field_px = 0;  // pixels that were looked at: the dish, else the frame

@@ -8,6 +8,10 @@
 namespace colony {
 namespace {
 
+const char* const kGridText =
+    "Against the threshold all rows are counted with one grid from the frame's corner, the answer itself with one from the corner of what is counted: at one "
+    "and the same threshold the two differ by what the place of a grid makes, a few hundredths.";
+
 /// The extremes of one line over the rows, in words.
 std::string hanging_text(const std::string& name, const ThresholdSweep& sweep, MeasuredLine ThresholdRow::* line) {
   const ThresholdRow *low = nullptr, *high = nullptr;
@@ -25,8 +29,8 @@ std::string hanging_text(const std::string& name, const ThresholdSweep& sweep, M
   if (counted < 2) return begin + ": whether the value hangs on the threshold is not known.";
   const Dimension& least = (low->*line).dimensions->capacity;
   const Dimension& most = (high->*line).dimensions->capacity;
-  return begin + ", with D0 from " + decimals(least.value) + " (at " + std::to_string(low->threshold) + ") to " + decimals(most.value) +
-         " (at " + std::to_string(high->threshold) + "): " +
+  return begin + ", with D0 for " + boxes_of(*(low->*line).dimensions) + " from " + decimals(least.value) + " (at " + std::to_string(low->threshold) + ") to " +
+         decimals(most.value) + " (at " + std::to_string(high->threshold) + "): " +
          (dimensions_differ(least, most) ? "more than errors and bias: part of the value is the threshold's."
                                          : "no more than errors and bias: the value does not hang on the threshold.");
 }
@@ -48,14 +52,22 @@ void ThresholdLines::add(const ThresholdView& view) {
     row.walls = measure_line(walls, boxes_, stop_);
     row.outline = measure_line(outline, boxes_, stop_);
   }
+  if (!is_ink) {
+    // Numbered from 1 on.
+    const auto last = std::max_element(view.labels.values.begin(), view.labels.values.end());
+    row.walls.object_count = row.outline.object_count = last == view.labels.values.end() ? 0 : *last;
+  }
   sweep_.rows.push_back(std::move(row));
 }
 
 ThresholdSweep ThresholdLines::finish(ObjectKind kind) {
   const LineNames names = line_names(kind);
   std::sort(sweep_.rows.begin(), sweep_.rows.end(), [](const ThresholdRow& a, const ThresholdRow& b) { return a.threshold < b.threshold; });
+  if (kind == ObjectKind::kRegions) {
+    for (ThresholdRow& row : sweep_.rows) row.walls.object_count = row.outline.object_count = std::nullopt;
+  }
   if (!sweep_.rows.empty()) {
-    sweep_.sentences = {hanging_text(names.walls, sweep_, &ThresholdRow::walls), hanging_text(names.outline, sweep_, &ThresholdRow::outline)};
+    sweep_.sentences = {hanging_text(names.walls, sweep_, &ThresholdRow::walls), hanging_text(names.outline, sweep_, &ThresholdRow::outline), kGridText};
   }
   return std::exchange(sweep_, {});
 }

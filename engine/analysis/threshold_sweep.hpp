@@ -1,7 +1,8 @@
 // threshold_sweep: the dimensions of a picture's walls and outline against the threshold: what hangs on it is a property of the threshold.
 // Method:  at each level of the segmentation's sweep the lines of what is found there, counted as everywhere, with one series of box sides in
 //          one frame, those of the answer's own walls: so the rows can be compared. The grid begins at the frame's corner, not at the
-//          foreground's, so a row of the answer's own threshold differs from the answer by what the place of a grid makes, a few hundredths.
+//          foreground's, so a row of the answer's own threshold differs from the answer by what the place of a grid makes, a few hundredths:
+//          the last sentence says so.
 // Units:   grey levels of the step `signal`; pixels.
 // Errors:  none: a row that cannot be counted says why. Throws Stopped.     Threads: as count_boxes.
 #pragma once
@@ -13,7 +14,7 @@ namespace colony {
 
 struct ThresholdRow {
   int threshold = 0;
-  MeasuredLine walls;                     // of what is found at this threshold
+  MeasuredLine walls;                     // of what is found at this threshold, with its own number of objects (of ink: not known)
   MeasuredLine outline;
 };
 

@@ -18,10 +18,6 @@ std::string joined(const std::vector<std::string>& names) {
   return text;
 }
 
-std::string boxes_of(const BoxDimensions& found) {
-  return "boxes of " + std::to_string(found.side_min_px) + " to " + std::to_string(found.side_max_px) + " px";
-}
-
 std::string course_text(const SlopeCourse& slopes) {
   const double change = slopes.last - slopes.first;
   const std::string ends = decimals(slopes.first) + " to " + decimals(slopes.last);
@@ -33,7 +29,7 @@ std::string value_text(const BoxDimensions& found) {
   return "D0 = " + with_error(found.capacity) + " (smallest cover " + decimals(found.smallest_cover.value) + ")";
 }
 
-std::string finding_text(const std::string& name, const BoxDimensions& found, const LineFinding& line) {
+std::string finding_text(const std::string& name, const BoxDimensions& found, const LineFinding& line, std::uint64_t line_count) {
   const SlopeCourse& slopes = line.slopes;
   const std::string begin = "The " + name + ": ";
   switch (line.finding) {
@@ -52,6 +48,10 @@ std::string finding_text(const std::string& name, const BoxDimensions& found, co
     case Finding::kScaling:
       return begin + "consistent with scaling: " + value_text(found) + " for " + boxes_of(found) + ", " + decimals(slopes.decades) +
              " decades, of which the local slopes are alike over " + decimals(slopes.plateau_decades) + ".";
+    case Finding::kTooFew:
+      return begin + "too few for a finding: " + std::to_string(line_count) + (line_count == 1 ? " object was" : " objects were") + " counted, and fewer than " +
+             std::to_string(kObjectsMin) + " say something of their own shapes, nothing of how many lie together. " + value_text(found) + " for " + boxes_of(found) +
+             " is the slope of these few.";
     case Finding::kNoFigures: break;
   }
   return {};
@@ -94,8 +94,22 @@ std::string conclusion(const std::string& name, const LineFinding& line, bool is
 }  // namespace
 
 std::string_view name_of(Finding finding) {
-  constexpr std::string_view kNames[] = {"no_figures", "crossover", "short_range", "wandering", "scaling"};
+  constexpr std::string_view kNames[] = {"no_figures", "crossover", "short_range", "wandering", "scaling", "too_few"};
   return kNames[static_cast<std::size_t>(finding)];
+}
+
+Finding finding_of(const MeasuredLine& line) {
+  if (!line.dimensions) return Finding::kNoFigures;
+  if (line.object_count && *line.object_count < kObjectsMin) return Finding::kTooFew;
+  const SlopeCourse slopes = slope_course(*line.dimensions);
+  if (slopes.decades < kDecadesMin) return Finding::kShortRange;
+  if (line.dimensions->crossover.found) return Finding::kCrossover;
+  const bool has_plateau = slopes.plateau_decades >= kDecadesMin && slopes.plateau_decades >= kPlateauShareMin * slopes.decades;
+  return has_plateau ? Finding::kScaling : Finding::kWandering;
+}
+
+std::string boxes_of(const BoxDimensions& found) {
+  return "boxes of " + std::to_string(found.side_min_px) + " to " + std::to_string(found.side_max_px) + " px";
 }
 
 std::string decimals(double value, int count) {
@@ -164,21 +178,20 @@ LineFinding judge_line(const std::string& name, const MeasuredLine& line, std::s
   }
   const BoxDimensions& found = *line.dimensions;
   result.slopes = slope_course(found);
-  const SlopeCourse& slopes = result.slopes;
-  const bool has_plateau = slopes.plateau_decades >= kDecadesMin && slopes.plateau_decades >= kPlateauShareMin * slopes.decades;
-  result.finding = slopes.decades < kDecadesMin ? Finding::kShortRange
-                   : found.crossover.found      ? Finding::kCrossover
-                   : has_plateau                ? Finding::kScaling
-                                                : Finding::kWandering;
+  result.finding = finding_of(line);
+  if (result.finding == Finding::kTooFew) {  // as many discs show no more
+    result.sentences.push_back(finding_text(name, found, result, *line.object_count));
+    return result;
+  }
   std::vector<std::string> alike, unlike;
   for (const NamedLine& control : controls) {
     if (!control.line->dimensions) continue;
     const Dimension& other = control.line->dimensions->capacity;
     const bool differs = dimensions_differ(found.capacity, other);
     (differs ? result.unlike_controls : result.like_controls).push_back(control.name);
-    (differs ? unlike : alike).push_back(control.name + " (" + with_error(other) + ")");
+    (differs ? unlike : alike).push_back(control.name + " (" + with_error(other) + " for " + boxes_of(*control.line->dimensions) + ")");
   }
-  result.sentences.push_back(finding_text(name, found, result));
+  result.sentences.push_back(finding_text(name, found, result, 0));
   // A slope that is only a mean of others is the dimension of nothing, not even of a line.
   const bool is_one_value = result.finding == Finding::kScaling || result.finding == Finding::kShortRange;
   const std::string plain = is_one_value ? plain_text(name, found) : std::string();

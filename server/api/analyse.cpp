@@ -182,22 +182,28 @@ Result<PictureMeasurement> measure_picture(std::string_view bytes, const ImageOp
   PictureMeasurement out;
   out.analysis = std::move(*analysis);
   out.objects = objects_of(out.analysis.segmentation);
-  out.sweep = sweep.finish(out.objects);
   for (StepImage& step : out.analysis.segmentation.steps) step.values = {};  // only the names are told
   const bool is_ink = out.analysis.segmentation.pipeline == Pipeline::kContours;
   const Status measured = is_ink ? measure_ink(out, boxes, effort.stop) : measure_objects(out, boxes, effort.stop);
   if (!measured) return measured.error();
-  out.findings = judge_lines(out.lines, out.controls, out.objects);
-  const std::vector<std::string> about_controls =
-      out.controls.empty() ? std::vector<std::string>() : control_sentences(out.objects, out.object_cover);
-  for (const std::vector<std::string>& sentences : {sentences_of(out.findings), about_controls, out.sweep.sentences}) {
-    out.verdict.insert(out.verdict.end(), sentences.begin(), sentences.end());
-  }
   std::uint64_t covered_px = 0;
   const std::vector<LabelArea> areas = label_areas(out.cells);
   for (const LabelArea& area : areas) covered_px += area.area_px;
   out.object_count = areas.size();
   if (!areas.empty()) out.object_area_mean_px = static_cast<double>(covered_px) / static_cast<double>(areas.size());
+  // Ink that encloses nothing is a set from elsewhere, judged as such.
+  if (is_ink && out.object_count > 0) set_object_count(out.object_count, out.lines, out.controls);
+  out.sweep = sweep.finish(out.objects);
+  if (is_ink && out.object_count > 0) {
+    for (ThresholdRow& row : out.sweep.rows) row.walls.object_count = row.outline.object_count = out.object_count;
+  }
+  out.findings = judge_lines(out.lines, out.controls, out.objects);
+  if (const std::string& doubt = out.analysis.segmentation.doubt; !doubt.empty()) out.verdict.insert(out.verdict.begin(), doubt);
+  const std::vector<std::string> about_controls =
+      out.controls.empty() ? std::vector<std::string>() : control_sentences(out.objects, out.object_cover, out.object_count);
+  for (const std::vector<std::string>& sentences : {sentences_of(out.findings), about_controls, out.sweep.sentences}) {
+    out.verdict.insert(out.verdict.end(), sentences.begin(), sentences.end());
+  }
   return out;
 }
 

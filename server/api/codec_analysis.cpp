@@ -73,7 +73,10 @@ Json match_properties() {
 
 Json comparison_result() {
   const Json kind = one_of({"cells", "nuclei", "regions", "objects"});
+  Json hidden = typed("integer");
+  hidden["description"] = "of the colony: cells or nuclei under others, in no figure; 0 of a picture, which hides what it hides";
   Json side = {{"um_per_px", nullable("number")},
+               {"hidden_count", std::move(hidden)},
                {"object_kind", kind},
                {"object_count", typed("integer")},
                {"object_area_mean_px", typed("number")}};

@@ -22,19 +22,21 @@ Json encode_dimension(const Dimension& dimension, const BoxDimensions& of) {
           {"range_px", {of.side_min_px, of.side_max_px}}};
 }
 
-// Mean, standard deviation (of the population) and range of one property of all cells.
+// Mean, standard deviation (of the population) and range of one property of all measured cells; null where none is.
 Json spread(const std::vector<Shape>& shapes, const std::function<double(const Shape&)>& property) {
-  double sum = 0.0, squares = 0.0;
-  double low = property(shapes.front()), high = low;
+  double sum = 0.0, squares = 0.0, low = 0.0, high = 0.0, count = 0.0;
   for (const Shape& shape : shapes) {
+    if (!shape.is_measured) continue;
     const double value = property(shape);
+    if (count == 0.0) low = high = value;
+    count += 1.0;
     sum += value;
     low = std::min(low, value);
     high = std::max(high, value);
   }
-  const auto count = static_cast<double>(shapes.size());
+  if (count == 0.0) return nullptr;
   const double mean = sum / count;
-  for (const Shape& shape : shapes) squares += (property(shape) - mean) * (property(shape) - mean);
+  for (const Shape& shape : shapes) squares += shape.is_measured ? (property(shape) - mean) * (property(shape) - mean) : 0.0;
   return {{"mean", mean}, {"sd", std::sqrt(squares / count)}, {"min", low}, {"max", high}};
 }
 
@@ -81,6 +83,7 @@ Json encode_neighbours(const LabelReport& report) {
   Json out = encode_sides(report.sides);
   out["interior_count"] = std::count_if(report.contacts.cells.begin(), report.contacts.cells.end(),
                                         [](const CellContacts& cell) { return cell.interior; });
+  out["not_judged"] = report.sides_reason.empty() ? Json(nullptr) : Json(report.sides_reason);
   const ClosedSides& closed = report.closed_sides;
   out["holes_given"] = encode_sides(closed.sides);
   out["holes_given"].update({{"hole_max_px", closed.hole_max_px}, {"hole_count", closed.hole_count}, {"hole_px", closed.hole_px}});
@@ -124,11 +127,16 @@ Json encode_phase(const std::optional<GrowthPhase>& phase, const char* value_nam
           {"r2", phase->r2}};
 }
 
+Json encode_levels(const std::optional<HumpFigures>& levels) {
+  if (!levels) return nullptr;
+  return {{"between_share", levels->between_share}, {"skewness", levels->skewness}, {"kurtosis", levels->kurtosis}};
+}
+
 }  // namespace
 
 Json encode_line(const MeasuredLine& line) {
   if (!line.dimensions) {
-    return {{"d0", nullptr}, {"d0_smallest_cover", nullptr}, {"d1", nullptr}, {"crossover", nullptr},
+    return {{"d0", nullptr}, {"d0_smallest_cover", nullptr}, {"d1", nullptr}, {"finding", name_of(finding_of(line))}, {"crossover", nullptr},
             {"curve", Json::array()}, {"local_slopes", Json::array()}, {"reason", line.reason}};
   }
   const BoxDimensions& found = *line.dimensions;
@@ -146,6 +154,7 @@ Json encode_line(const MeasuredLine& line) {
   return {{"d0", encode_dimension(found.capacity, found)},
           {"d0_smallest_cover", encode_dimension(found.smallest_cover, found)},
           {"d1", encode_dimension(found.information, found)},
+          {"finding", name_of(finding_of(line))},
           {"crossover",
            {{"found", found.crossover.found},
             {"drift", found.crossover.drift},
@@ -188,8 +197,9 @@ Json encode_findings(const LineFindings& findings) {
 
 Json encode_threshold_sweep(const ThresholdSweep& sweep) {
   const auto line = [](const MeasuredLine& measured) -> Json {
-    if (!measured.dimensions) return {{"d0", nullptr}, {"crossover", nullptr}, {"reason", measured.reason}};
+    if (!measured.dimensions) return {{"d0", nullptr}, {"finding", name_of(finding_of(measured))}, {"crossover", nullptr}, {"reason", measured.reason}};
     return {{"d0", encode_dimension(measured.dimensions->capacity, *measured.dimensions)},
+            {"finding", name_of(finding_of(measured))},
             {"crossover", measured.dimensions->crossover.found},
             {"reason", nullptr}};
   };
@@ -203,6 +213,7 @@ Json encode_threshold_sweep(const ThresholdSweep& sweep) {
 Json encode_report(const LabelReport& report) {
   return {{"um_per_px", or_null(report.um_per_px)},
           {"cell_count", report.cell_count},
+          {"visible_cell_count", report.visible_count},
           {"cell_area_mean_px", report.cell_area_mean_px},
           {"px_per_cell_diameter", report.px_per_cell_diameter},
           {"verdict", report.verdict},
@@ -212,7 +223,9 @@ Json encode_report(const LabelReport& report) {
           {"object_cover", report.object_cover},
           {"colony", encode_colony(report.colony, report.um_per_px)},
           {"cells",
-           {{"area_px", spread(report.shapes, [](const Shape& s) { return static_cast<double>(s.area_px); })},
+           {{"measured_count", report.measured_count},
+            {"partly_hidden_count", report.partly_hidden_count},
+            {"area_px", spread(report.shapes, [](const Shape& s) { return static_cast<double>(s.area_px); })},
             {"perimeter_px", spread(report.shapes, [](const Shape& s) { return s.perimeter_px; })},
             {"circularity", spread(report.shapes, [](const Shape& s) { return s.circularity; })},
             {"solidity", spread(report.shapes, [](const Shape& s) { return s.solidity; })},
@@ -287,6 +300,8 @@ Json encode_segmentation(const ImageAnalysis& analysis) {
           {"foreground_reason", found.foreground_reason},
           {"threshold", found.threshold},
           {"threshold_given", found.threshold_given},
+          {"levels", encode_levels(found.levels)},
+          {"doubt", found.doubt.empty() ? Json(nullptr) : Json(found.doubt)},
           {"background_reach_px", found.background_reach_px},
           {"area_min_px", found.area_min_px},
           {"field_px", found.field_px},

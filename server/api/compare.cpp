@@ -23,9 +23,7 @@ double nucleus_area_mean_um2(const Colony& colony) {
   return sum / static_cast<double>(colony.cells().size());
 }
 
-std::string range_text(const BoxDimensions& found) {
-  return "boxes of " + std::to_string(found.side_min_px) + " to " + std::to_string(found.side_max_px) + " px, the range that both have";
-}
+std::string range_text(const BoxDimensions& found) { return boxes_of(found) + ", the range that both have"; }
 
 // What box counting of one line says about the two.
 Json judge(const std::string& name, const MeasuredLine& simulated, const MeasuredLine& real, const LineFinding& of_simulated,
@@ -42,7 +40,11 @@ Json judge(const std::string& name, const MeasuredLine& simulated, const Measure
   const double se = std::sqrt(a.standard_error * a.standard_error + b.standard_error * b.standard_error);
   const bool differs = dimensions_differ(a, b);
   const std::string values = "simulated " + with_error(a) + ", real " + with_error(b) + " for " + range_text(*simulated.dimensions) + ": ";
-  if (differs) {
+  if (of_simulated.finding == Finding::kTooFew || of_real.finding == Finding::kTooFew) {
+    verdict.push_back(begin + values + "nothing follows: fewer than " + std::to_string(kObjectsMin) + " objects were counted on " +
+                      (of_simulated.finding != of_real.finding ? std::string(of_real.finding == Finding::kTooFew ? "the picture's" : "the colony's") + " side."
+                                                               : std::string("both sides.")));
+  } else if (differs) {
     verdict.push_back(begin + values + "they differ by more than errors and the bias of boxes. What follows: the two pictures are not alike in this. "
                       "What does not: which structure differs.");
   } else {
@@ -120,10 +122,12 @@ Json encode_match(const Comparison& comparison) {
           {"cell_area_px", or_null(match.request.cell_area_px)}};
 }
 
-Json encode_side(const ComparedSide& side, ObjectKind kind, std::uint64_t count, double area_px, std::optional<double> um_per_px) {
+Json encode_side(const ComparedSide& side, ObjectKind kind, std::uint64_t count, std::uint64_t hidden_count, double area_px,
+                 std::optional<double> um_per_px) {
   return {{"um_per_px", um_per_px ? Json(*um_per_px) : Json(nullptr)},
           {"object_kind", name_of(kind)},
           {"object_count", count},
+          {"hidden_count", hidden_count},
           {"object_area_mean_px", area_px},
           {"fractal", {{"walls", encode_line(side.lines.walls)}, {"outline", encode_line(side.lines.outline)}}},
           {"controls", encode_controls(side.controls)},
@@ -271,12 +275,14 @@ Json encode_comparison(const Comparison& comparison) {
   const auto add = [&](const char* whose, const std::vector<std::string>& sentences) {
     for (const std::string& sentence : sentences) verdict.push_back(whose + sentence);
   };
+  add("The colony. ", hidden_sentences(comparison.simulated));
   add("The colony. ", sentences_of(simulated.findings));
-  add("The colony. ", control_sentences(comparison.match.simulated, comparison.simulated.object_cover));
+  add("The colony. ", control_sentences(comparison.match.simulated, comparison.simulated.object_cover, comparison.simulated.visible_count));
+  if (!comparison.real.analysis.segmentation.doubt.empty()) add("The picture. ", {comparison.real.analysis.segmentation.doubt});
   add("The picture. ", sentences_of(real.findings));
-  if (!real.controls.empty()) add("The picture. ", control_sentences(comparison.real.objects, comparison.real.object_cover));
+  if (!real.controls.empty()) add("The picture. ", control_sentences(comparison.real.objects, comparison.real.object_cover, comparison.real.object_count));
   add("The picture. ", comparison.real.sweep.sentences);
-  Json side = encode_side(real, comparison.real.objects, comparison.real.object_count, comparison.real.object_area_mean_px,
+  Json side = encode_side(real, comparison.real.objects, comparison.real.object_count, 0, comparison.real.object_area_mean_px,
                           comparison.real.analysis.um_per_px);
   side["threshold_sweep"] = encode_threshold_sweep(comparison.real.sweep);
   return {{"time_h", comparison.at.time_h},
@@ -285,7 +291,8 @@ Json encode_comparison(const Comparison& comparison) {
           {"match", encode_match(comparison)},
           {"verdict", verdict},
           {"differences", std::move(differences)},
-          {"simulated", encode_side(simulated, comparison.match.simulated, comparison.simulated.cell_count, comparison.simulated.cell_area_mean_px,
+          {"simulated", encode_side(simulated, comparison.match.simulated, comparison.simulated.visible_count,
+                                    comparison.simulated.cell_count - comparison.simulated.visible_count, comparison.simulated.cell_area_mean_px,
                                     comparison.um_per_px)},
           {"real", std::move(side)}};
 }

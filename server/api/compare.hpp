@@ -77,7 +77,8 @@ std::int64_t compared_px_estimate(const Colony& colony, const Match& match);
 Result<double> matched_scale(const Colony& colony, const Match& match, const Effort& effort);
 
 /// PNG: both contours above in one scale, below log-log plots with fitted lines, and the slopes from small to large boxes.
-std::string comparison_figure(const Comparison& comparison);
+/// Throws Stopped when asked to, between rows of the file.
+std::string comparison_figure(const Comparison& comparison, StopFlag stop = nullptr);
 /// The same before it is a file.
 Canvas comparison_canvas(const Comparison& comparison);
 

@@ -93,8 +93,9 @@ bool has_outline(ObjectKind kind) { return kind == ObjectKind::kCells || kind ==
 std::vector<Curve> curves_of(const LineReport& all, const std::vector<ControlReport>& controls, const ComparedSide& side, ObjectKind kind) {
   const LineNames names = line_names(kind);
   std::vector<Curve> curves;
-  const auto add = [&](const std::string& name, const MeasuredLine& line, const MeasuredLine& compared, Ink ink, bool is_control) {
-    if (line.dimensions) curves.push_back({name, &line, &compared, ink, is_control});
+  const auto add = [&](const std::string& name, const MeasuredLine& line, const MeasuredLine& compared, Ink ink, bool is_control,
+                       bool is_dashed = false) {
+    if (line.dimensions) curves.push_back({name, &line, &compared, ink, is_control, is_dashed});
   };
   add(names.walls, all.walls, side.lines.walls, kBlackInk, false);
   if (has_outline(kind)) add(names.outline, all.outline, side.lines.outline, kOutlineInk, false);
@@ -102,7 +103,7 @@ std::vector<Curve> curves_of(const LineReport& all, const std::vector<ControlRep
     const std::string& name = controls[i].name;
     const bool is_smooth = name == "without_noise", is_hexagonal = name == "hexagonal";
     add(is_smooth ? "control, without noise" : is_hexagonal ? "control, hexagonal discs" : "control, random discs", controls[i].lines.walls,
-        side.controls[i].lines.walls, is_smooth ? Ink{0x2c, 0xa0, 0x2c} : is_hexagonal ? Ink{0xd6, 0x27, 0x28} : Ink{0xe0, 0x82, 0x14}, true);
+        side.controls[i].lines.walls, is_smooth ? Ink{0x2c, 0xa0, 0x2c} : is_hexagonal ? Ink{0xd6, 0x27, 0x28} : Ink{0xe0, 0x82, 0x14}, true, is_smooth);
   }
   return curves;
 }
@@ -141,13 +142,15 @@ Canvas comparison_canvas(const Comparison& comparison) {
   const double slope_y = legend_y + rows * kLegendRow_px + kRowGap_px;
   Canvas canvas(static_cast<std::int64_t>(kLeft_px + 2.0 * kPanelWidth_px + kBetween_px + kRight_px),
                 static_cast<std::int64_t>(slope_y + kSlopeHeight_px + kBottom_px));
+  const std::uint64_t all = comparison.simulated.cell_count;
+  const std::string hidden = all == comparison.simulated.visible_count ? std::string() : " seen of " + std::to_string(all);
   for (int i = 0; i < 2; ++i) {
     const double x = kLeft_px + i * (kPanelWidth_px + kBetween_px);
     const Panel contours{x, kTitle_px, kPanelWidth_px, kContourHeight_px}, counts{x, count_y, kPanelWidth_px, kCountHeight_px},
         course{x, slope_y, kPanelWidth_px, kSlopeHeight_px};
     const bool is_simulated = i == 0;
     canvas.text({x, kTitle_px - 16.0},
-                is_simulated ? counted("a", "simulated", comparison.simulated.cell_count, comparison.match.simulated) +
+                is_simulated ? counted("a", "simulated", comparison.simulated.visible_count, comparison.match.simulated) + hidden +
                                    format(", %.0f h", comparison.at.time_h)
                              : counted("b", "real", comparison.real.object_count, comparison.real.objects),
                 kBlackInk, Align::kLeft, 16.0);
@@ -168,6 +171,6 @@ Canvas comparison_canvas(const Comparison& comparison) {
   return canvas;
 }
 
-std::string comparison_figure(const Comparison& comparison) { return encode_step_png(comparison_canvas(comparison).picture()); }
+std::string comparison_figure(const Comparison& comparison, StopFlag stop) { return encode_step_png(comparison_canvas(comparison).picture(), stop); }
 
 }  // namespace colony::server::api

@@ -137,11 +137,12 @@ http::Response get_comparison_figure(Context& context, const Call& call) {
   const std::string tag = derived_tag(context, call, moment->digest, moment->seq, row->id + " " + source->options_json);
   if (auto settled = settled_by_tag(call, tag)) return std::move(*settled);
   if (auto kept = context.kept->find(tag)) return std::move(*kept);
-  const auto comparison = compare_again(context, *row, effort_of(context, call), Sweep::kLeaveOut);
+  const Effort effort = effort_of(context, call);
+  const auto comparison = compare_again(context, *row, effort, Sweep::kLeaveOut);
   if (!comparison) return failure(comparison.error(), call);
   http::Response response;
   response.headers.set("Content-Type", call.media);
-  response.body = comparison_figure(*comparison);
+  response.body = comparison_figure(*comparison, effort.stop);
   stamp(response, tag);
   context.kept->keep(tag, {row->id, row->analysis_id, row->job_id}, response);
   return response;

@@ -78,6 +78,29 @@ double SlopeRange::y(const Panel& panel, double slope) const {
 
 void draw_frame(Canvas& canvas, const Panel& panel) { canvas.box({panel.x, panel.y}, panel.width, panel.height, kAxisInk, false); }
 
+namespace {
+
+/// Along the whole of `points`, so that dashes run over their corners.
+void draw_dashed(Canvas& canvas, const std::vector<CanvasPoint>& points, Ink ink) {
+  constexpr double kDash_px = 9.0, kPeriod_px = 16.0;
+  double walked = 0.0;
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    const CanvasPoint a = points[i - 1], b = points[i];
+    const double length = std::hypot(b.x - a.x, b.y - a.y);
+    for (double at = 0.0; at < length;) {
+      const double phase = std::fmod(walked + at, kPeriod_px);
+      const bool is_dash = phase < kDash_px;
+      const double end = std::min(length, at + std::max(0.25, (is_dash ? kDash_px : kPeriod_px) - phase));
+      const auto on = [&](double s) { return CanvasPoint{a.x + (b.x - a.x) * s / length, a.y + (b.y - a.y) * s / length}; };
+      if (is_dash) canvas.line(on(at), on(end), ink, 2.0);
+      at = end;
+    }
+    walked += length;
+  }
+}
+
+}  // namespace
+
 void draw_counts(Canvas& canvas, const Panel& panel, const Axes& axes, const std::vector<Curve>& curves) {
   const auto with_fit = std::find_if(curves.begin(), curves.end(), [](const Curve& c) { return !c.is_control && c.compared->dimensions; });
   draw_sides(canvas, panel, axes, with_fit == curves.end() ? nullptr : &*with_fit);
@@ -96,7 +119,7 @@ void draw_counts(Canvas& canvas, const Panel& panel, const Axes& axes, const std
         points.push_back({axes.x(panel, static_cast<double>(count.side_px)), axes.y(panel, count.count_mean)});
       }
       if (is_control) {
-        canvas.lines(points, curve.ink, 1.5);
+        if (!curve.is_dashed) canvas.lines(points, curve.ink, 1.5);
         continue;
       }
       if (!curve.compared->dimensions) {
@@ -117,6 +140,14 @@ void draw_counts(Canvas& canvas, const Panel& panel, const Axes& axes, const std
       for (std::size_t i = 0; i < points.size(); ++i) canvas.dot(points[i], 4.5, curve.ink, i < fit.counts.size());
     }
   }
+  for (const Curve& curve : curves) {
+    if (!curve.is_dashed) continue;
+    std::vector<CanvasPoint> points;
+    for (const BoxCount& count : curve.all->dimensions->counts) {
+      points.push_back({axes.x(panel, static_cast<double>(count.side_px)), axes.y(panel, count.count_mean)});
+    }
+    draw_dashed(canvas, points, curve.ink);
+  }
   draw_frame(canvas, panel);
 }
 
@@ -125,7 +156,11 @@ void draw_legend(Canvas& canvas, const Panel& panel, const std::vector<Curve>& c
   const double text_x = panel.x + 52.0, value_x = panel.x + 330.0;
   const BoxDimensions* fitted = nullptr;
   for (const Curve& curve : curves) {
-    canvas.line({panel.x, y - 5.0}, {panel.x + 38.0, y - 5.0}, curve.ink, curve.is_control ? 1.5 : 2.0);
+    if (curve.is_dashed) {
+      draw_dashed(canvas, {{panel.x, y - 5.0}, {panel.x + 38.0, y - 5.0}}, curve.ink);
+    } else {
+      canvas.line({panel.x, y - 5.0}, {panel.x + 38.0, y - 5.0}, curve.ink, curve.is_control ? 1.5 : 2.0);
+    }
     if (!curve.is_control) canvas.dot({panel.x + 19.0, y - 5.0}, 4.5, curve.ink, true);
     canvas.text({text_x, y}, curve.name, kBlackInk);
     if (curve.compared->dimensions) {
@@ -156,11 +191,17 @@ void draw_slopes(Canvas& canvas, const Panel& panel, const Axes& axes, const Slo
       if (curve.is_control != is_control) continue;
       std::vector<CanvasPoint> points;
       for (const LocalSlope& slope : windowed_slopes(*curve.all->dimensions)) points.push_back({axes.x(panel, slope.side_px), range.y(panel, slope.dimension)});
-      canvas.lines(points, curve.ink, is_control ? 1.5 : 2.0);
+      if (!curve.is_dashed) canvas.lines(points, curve.ink, is_control ? 1.5 : 2.0);
       for (const CanvasPoint& point : points) {
         if (!is_control) canvas.dot(point, 3.5, curve.ink, true);
       }
     }
+  }
+  for (const Curve& curve : curves) {
+    if (!curve.is_dashed) continue;
+    std::vector<CanvasPoint> points;
+    for (const LocalSlope& slope : windowed_slopes(*curve.all->dimensions)) points.push_back({axes.x(panel, slope.side_px), range.y(panel, slope.dimension)});
+    draw_dashed(canvas, points, curve.ink);
   }
   draw_frame(canvas, panel);
 }

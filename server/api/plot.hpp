@@ -35,6 +35,7 @@ struct Curve {
   const MeasuredLine* compared = nullptr;
   Ink ink;
   bool is_control = false;
+  bool is_dashed = false;  // drawn last: it may lie on another curve, which then shows between its dashes
 };
 
 /// 1, 2 or 5 times a power of ten, at most `most`, from 1e-6 on.

@@ -25,14 +25,21 @@ Json numbers(std::initializer_list<const char*> names) {
   return properties;
 }
 
+Json finding_schema() {
+  return {{"enum", {"no_figures", "too_few", "crossover", "short_range", "wandering", "scaling"}},
+          {"description", "too_few: lines of fewer than 10 cells, nuclei or objects; short_range: less than a decade of box sides; scaling: a power law fits over a "
+                          "decade and three quarters of the range or more; no other is a dimension, and this one proves no fractal"}};
+}
+
 Json line_schema() {
   Json crossover = numbers({"drift", "drift_se", "t", "t_critical"});
   crossover["found"] =
-      described(boolean(), "the local slopes drift over the range: a crossover, not scaling; d0 is then no dimension");
+      described(boolean(), "the test on the drift of the local slopes alone; `finding` is what follows from all of them");
   return strict_object(
       {{"d0", or_null(reference("Dimension"))},
        {"d0_smallest_cover", or_null(reference("Dimension"))},
        {"d1", or_null(reference("Dimension"))},
+       {"finding", finding_schema()},
        {"crossover", or_null(strict_object(std::move(crossover)))},
        {"curve", list(strict_object({{"side_px", count()},
                                      {"count_mean", number()},
@@ -45,8 +52,7 @@ Json line_schema() {
 Json findings_schema() {
   Json line = Json::object();
   for (const char* name : {"decades", "plateau_decades", "slope_small_boxes", "slope_large_boxes"}) line[name] = nullable_number();
-  line["finding"] = {{"enum", {"no_figures", "crossover", "short_range", "wandering", "scaling"}},
-                     {"description", "scaling: a power law fits over a decade and three quarters of the range or more; no other is a dimension, and this one proves no fractal"}};
+  line["finding"] = finding_schema();
   line["decades"]["description"] = "of box sides counted";
   line["plateau_decades"]["description"] = "longest range over which the local slopes are alike";
   line["like_controls"] = described(texts(), "controls with the same D0 within errors and bias: the value says nothing that they do not");
@@ -57,6 +63,7 @@ Json findings_schema() {
 
 Json threshold_sweep_schema() {
   const Json line = strict_object({{"d0", or_null(reference("Dimension"))},
+                                   {"finding", finding_schema()},
                                    {"crossover", {{"type", Json::array({"boolean", "null"})}}},
                                    {"reason", {{"type", Json::array({"string", "null"})}}}});
   Json schema = strict_object({{"sides_px", list(count())},
@@ -87,6 +94,7 @@ Json neighbours_schema() {
   Json closed = sides;
   closed["hole_max_px"] = closed["hole_count"] = closed["hole_px"] = count();
   sides["interior_count"] = count();
+  sides["not_judged"] = described({{"type", Json::array({"string", "null"})}}, "why the sides are not held against Gibson's table; null: they are");
   sides["holes_given"] = described(strict_object(std::move(closed)),
                                    "the same with shut-in holes of at most half a mean cell given to the cells about them: where cells meet they "
                                    "leave holes of a few pixels, which Gibson's table does not know");
@@ -96,13 +104,16 @@ Json neighbours_schema() {
 Json report_properties() {
   Json cells = Json::object();
   for (const char* name : {"area_px", "perimeter_px", "circularity", "solidity", "eccentricity"}) {
-    cells[name] = strict_object(numbers({"mean", "sd", "min", "max"}));
+    cells[name] = or_null(strict_object(numbers({"mean", "sd", "min", "max"})));
   }
+  cells["measured_count"] = described(count(), "cells in these means: of 20 pixels and more, and seen by half of their own outline");
+  cells["partly_hidden_count"] = described(count(), "cells of which less than half is seen: what lies over them gives them their shape, so they are in no mean");
   const Json group = strict_object({{"count", count()}, {"mean", number()}, {"se", number()}});
   const Json straightness =
       strict_object({{"siblings", group}, {"others", group}, {"difference", number()}, {"t", number()}});
   Json ring = numbers({"inner_px", "outer_px", "area_mean_px", "area_se_px", "density_per_px"});
-  ring["cell_count"] = ring["covered_px"] = count();
+  ring["cell_count"] = described(count(), "cells seen there");
+  ring["covered_px"] = count();
   ring["active_share"] = nullable_number();
   Json apart =
       numbers({"share", "apart_area_cv", "apart_circularity_sd", "other_area_cv", "other_circularity_sd"});
@@ -112,8 +123,9 @@ Json report_properties() {
                   {"placement", {{"enum", {"same_places", "touching", "spread"}}}}};
   control.update(lines);
   return {{"um_per_px", nullable_number()},
-          {"cell_count", count()},
-          {"cell_area_mean_px", number()},
+          {"cell_count", described(count(), "all cells of the colony, hidden ones too; of a picture the objects seen")},
+          {"visible_cell_count", described(count(), "those seen from above: the figures of the picture are about them")},
+          {"cell_area_mean_px", described(number(), "covered pixels / visible_cell_count")},
           {"px_per_cell_diameter", number()},
           {"verdict", described(texts(), "what follows from the figures, and what does not")},
           {"findings", reference("Findings")},
@@ -189,6 +201,9 @@ Json segmentation_schema() {
   for (const char* name : {"pipeline_given", "foreground_given", "threshold_given", "dish_found"}) properties[name] = boolean();
   properties["pipeline_reason"] = described(text(), "why this pipeline, and which one else there is");
   properties["foreground_reason"] = text();
+  properties["levels"] = described(or_null(strict_object(numbers({"between_share", "skewness", "kurtosis"}))),
+                                   "of the step signal: share of the variance between Otsu's classes, skewness, kurtosis; a normal distribution has 0.637, 0, 3");
+  properties["doubt"] = described({{"type", Json::array({"string", "null"})}}, "why there may be nothing in the picture");
   for (const char* name : {"area_mean_um2", "foreground_um2", "density_per_mm2"}) properties[name] = nullable_number();
   properties["sweep"] =
       list(strict_object({{"threshold", count()}, {"foreground_px", count()}, {"object_count", count()}}));

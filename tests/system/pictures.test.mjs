@@ -42,6 +42,27 @@ function tiff(width, height, data) {
   return out;
 }
 
+test('of cells that lie on each other it is said how many are hidden', async (t) => {
+  const server = await startServer(t);
+  const job = await finishedJob(server, { preset: 'tumour', seed: 1, until: { cells: 200 } });
+  const { json } = await server.get(`/v1/jobs/${job.id}/analysis?width_px=1024`);
+  assert.equal(json.cell_count, 200, 'all of the colony');
+  assert.ok(json.visible_cell_count < 190, `${json.visible_cell_count} are seen`);
+  const { measured_count: measured, partly_hidden_count: partly, area_px: area } = json.cells;
+  assert.ok(partly > 0 && measured + partly <= json.visible_cell_count);
+  assert.ok(area.min >= 20);
+  assert.ok(json.cells.circularity.max < 1.09, `${json.cells.circularity.max}: no slivers`);
+  assert.match(json.neighbours.not_judged, /^the table is of a sheet/);
+  const words = json.verdict.join(' ');
+  assert.match(words, new RegExp(`Of the colony's 200 cells, ${200 - json.visible_cell_count} are hidden under others`));
+  assert.doesNotMatch(words, /against Gibson's table p/);
+  // One cell alone: figures, and nothing that follows from them.
+  const lone = (await server.get(`/v1/jobs/${job.id}/analysis?at_h=0&width_px=512`)).json;
+  assert.equal(lone.findings.walls.finding, 'too_few');
+  assert.equal(lone.fractal.walls.finding, 'too_few');
+  assert.doesNotMatch(lone.verdict.join(' '), /consistent with scaling|they tile it/);
+});
+
 test('a job is seen, measured and compared', async (t) => {
   const server = await startServer(t);
   const job = await finishedJob(server, small());
@@ -131,16 +152,16 @@ test('a job is seen, measured and compared', async (t) => {
     writeFileSync(picture, discs(6, 9));
     const analyzed = await colony(server, ['analyze', picture, '--pipeline', 'nuclei', '--steps', join(folder, 'steps')]);
     assert.equal(analyzed.code, 0, analyzed.err);
-    assert.match(analyzed.out, /36 objects/);
+    assert.match(analyzed.out, /36 nuclei/);
     assert.match(analyzed.out, /pipeline nuclei, asked for/);
-    assert.match(analyzed.out, /threshold \d+: walls \d/);
+    assert.match(analyzed.out, /threshold \d+: outlines of the nuclei D0 \d/);
     const id = /analysis (\S+)/.exec(analyzed.out)[1];
     const compared = await colony(server, ['compare', job.id, id, '--figure', join(folder, 'figure.png')]);
     assert.equal(compared.code, 0, compared.err);
     assert.ok(pngFacts(readFileSync(join(folder, 'figure.png'))).height > 1000);
     const measured = await colony(server, ['measure', job.id, '--um-per-px', '0.2']);
     assert.equal(measured.code, 0, measured.err);
-    assert.match(measured.out, /interior cells/, 'sides, held against Gibson\'s table');
+    assert.match(measured.out, /Gibson's table/, 'sides, held against it or why not');
     const objects = join(folder, 'objects.csv'), sheet = join(folder, 'analysis.html');
     assert.equal((await colony(server, ['analyze', picture, '--objects', objects, '--html', sheet])).code, 0);
     assert.equal(readFileSync(objects, 'utf8').trim().split('\r\n').length, 37);

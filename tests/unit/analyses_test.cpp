@@ -74,8 +74,14 @@ TEST(JobAnalysis, HasItsControlsBesideIt) {
   for (const Json& sentence : json["verdict"]) EXPECT_THAT(sentence.get<std::string>(), Not(AnyOf(HasSubstr("image: "), HasSubstr("areas: "))));
   EXPECT_EQ(json["neighbours"]["holes_given"]["classes"].size(), json["neighbours"]["classes"].size());
   EXPECT_TRUE(json["packing"]["reason"].is_null());
-  EXPECT_EQ(json["findings"]["walls"]["finding"], "crossover");
-  EXPECT_THAT(json["verdict"][0].get<std::string>(), HasSubstr("a crossover, not scaling"));
+  EXPECT_EQ(json["visible_cell_count"], 6);
+  // Six cells have figures, and no finding: neither the lines, nor their controls, nor the sides.
+  EXPECT_EQ(json["findings"]["walls"]["finding"], "too_few");
+  EXPECT_EQ(json["fractal"]["outline"]["finding"], "too_few");
+  EXPECT_EQ(json["controls"][1]["walls"]["finding"], "too_few");
+  EXPECT_THAT(json["neighbours"]["not_judged"].get<std::string>(), HasSubstr("fewer than 10 cells"));
+  EXPECT_THAT(json["verdict"][0].get<std::string>(), HasSubstr("too few for a finding: 6 objects were counted"));
+  EXPECT_THAT(json["verdict"].dump(), Not(AnyOf(HasSubstr("consistent with scaling"), HasSubstr("they tile it"))));
   // A scale that is twice as fine has four times the pixels in the same cells.
   auto finer = fixture.get(kJob + "/analysis?width_px=1024");
   EXPECT_NEAR(json_of(finer)["cell_area_mean_px"].get<double>() / json["cell_area_mean_px"].get<double>(), 4.0, 0.04);

@@ -85,10 +85,10 @@ TEST_F(Cli, ARefusedPictureIsCalledByItsName) {
 
 Json line_json(bool is_measured) {
   if (!is_measured) {
-    return Json::parse(R"({"d0":null,"d0_smallest_cover":null,"d1":null,"crossover":null,"curve":[],"local_slopes":[],"reason":"too few sides"})");
+    return Json::parse(R"({"d0":null,"d0_smallest_cover":null,"d1":null,"finding":"no_figures","crossover":null,"curve":[],"local_slopes":[],"reason":"too few sides"})");
   }
   return Json::parse(R"({"d0":{"value":1.511,"se":0.01,"r2":0.999,"range_px":[3,60]},"d0_smallest_cover":{"value":1.522},"d1":{"value":1.533},
-    "crossover":{"found":true},"curve":[{"side_px":3,"count_mean":10}],"local_slopes":[],"reason":null})");
+    "finding":"wandering","crossover":{"found":true},"curve":[{"side_px":3,"count_mean":10}],"local_slopes":[],"reason":null})");
 }
 
 /// Members that the page shows and the rest of an answer need not have.
@@ -101,11 +101,12 @@ Json analysis_json() {
   Json given = sides;
   given.update({{"hole_count", 198}, {"hole_px", 1024}, {"hole_max_px", 300}, {"sides_mean", 5.91}, {"p_value", 0.74}});
   sides["interior_count"] = 95;
+  sides["not_judged"] = "80 of 97 are hidden";
   sides["holes_given"] = given;
-  return {{"time_h", 50.0}, {"last_seq", 41}, {"digest", "digest-of-50-h"}, {"cell_count", 17}, {"um_per_px", 0.0625}, {"px_per_cell_diameter", 31.5},
+  return {{"time_h", 50.0}, {"last_seq", 41}, {"digest", "digest-of-50-h"}, {"cell_count", 97}, {"visible_cell_count", 17}, {"um_per_px", 0.0625}, {"px_per_cell_diameter", 31.5},
           {"fractal", lines}, {"controls", {control}}, {"verdict", {"It follows."}}, {"neighbours", sides},
-          {"colony", {{"area_px", 5}}}, {"cells", {{"area_px", {{"mean", 3}}}}}, {"apart", {{"share", 0}}}, {"packing", {{"reason", "none"}}},
-          {"growth", {{"lag", nullptr}}}, {"sibling_straightness", {{"difference", 0.0123}, {"t", 2.5}}},
+          {"colony", {{"area_px", 5}}}, {"cells", {{"measured_count", 15}, {"area_px", {{"mean", 800.5}, {"sd", 1}, {"min", 790}, {"max", 810}}}, {"solidity", nullptr}}}, {"apart", {{"share", 0}}}, {"packing", {{"void_share", 0.00022239622863492336}, {"union_um3", 81234.5678}, {"reason", nullptr}}},
+          {"growth", {{"lag", nullptr}, {"exponential", {{"from_h", 0.0}, {"to_h", 65.25}, {"row_count", 40}, {"doubling_time_h", 14.876543}, {"low", 14.1}, {"high", nullptr}, {"r2", 0.99}}}, {"reason", nullptr}}}, {"sibling_straightness", {{"difference", 0.0123}, {"t", 2.5}}},
           {"rings", {{{"inner_px", 0}, {"outer_px", 10.5}, {"cell_count", 4}, {"covered_px", 300}, {"area_mean_px", 75}, {"area_se_px", 2.25},
                       {"density_per_px", 0.013333}, {"active_share", nullptr}}}}};
 }
@@ -157,12 +158,16 @@ TEST(ReportPage, SaysOfWhichMomentItIsAndLeavesNothingOut) {
   EXPECT_THAT(html, HasSubstr("The colony at 50.0 h"));
   EXPECT_THAT(html, HasSubstr("<th>digest</th><td><code>digest-of-50-h"));
   EXPECT_THAT(html, HasSubstr("<th>latest digest</th><td><code>digest-of-now"));
-  EXPECT_THAT(html, HasSubstr("<th>cell_count</th><td>17"));
+  EXPECT_THAT(html, HasSubstr("<th>cells</th><td>97</td></tr><tr><th>cells seen from above</th><td>17<"));
   EXPECT_THAT(html, HasSubstr("<th>latest cells</th><td>60"));
   EXPECT_THAT(html, Not(HasSubstr("<th>cells</th><td>60")));
-  for (const char* member : {"0.0625", "31.5", "1.511", "1.522", "1.533", "0.0123", "4.83", "5.91", "0.74", "0.0001", "198", "0.013333", "10.50", "too few sides"}) {
+  for (const char* member : {"0.0625 um a pixel", "1.969 um", "1.511", "1.522", "1.533", "0.0123", "4.83", "5.91", "0.74", "0.0001", "198", "too few sides", "no clear scaling",
+                             "80 of 97 are hidden", "void share of that volume</th><td>0.000222<", "81235 um3", "14.88 h", "65.25 h",
+                             "<td class=n>0.656</td>", "cells per um2", "<td class=n>3.413</td>", "<td>14.1 and more</td>", "<td class=n>3.127 um2</td>"}) {
     EXPECT_THAT(html, HasSubstr(member));
   }
+  EXPECT_THAT(html, Not(HasSubstr("null")));
+  EXPECT_THAT(html, Not(HasSubstr("81234.5678")));
   int tables = 0;
   for (std::size_t at = html.find("<table>"); at != std::string::npos; at = html.find("<table>", at + 1), ++tables) {
     const std::vector<int> columns = columns_of(html.substr(at, html.find("</table>", at) - at));

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "client/cli/report_facts.hpp"
 #include "tests/unit/cli_fixture.hpp"
 
 namespace colony::client {
@@ -28,7 +29,8 @@ json line(double value, bool is_crossover) {
   return {{"d0", dimension(value)},
           {"d0_smallest_cover", dimension(value + 0.01)},
           {"d1", dimension(value - 0.01)},
-          {"crossover", {{"found", is_crossover}}},
+          {"finding", is_crossover ? "crossover" : "short_range"},
+          {"crossover", {{"found", true}}},  // the drift alone: no label is made of it
           {"curve", {{{"side_px", 3}, {"count_mean", 900.5}}, {{"side_px", 96}, {"count_mean", 8.25}}}},
           {"reason", nullptr}};
 }
@@ -43,20 +45,23 @@ json job_analysis() {
   json seen = {{"classes", classes}, {"other_count", 3}, {"sides_mean", 5.5}, {"difference_max", 0.1}, {"chi_square", 9.0}, {"degrees", 4}, {"p_value", 0.06}};
   json given = seen;
   given.update(json{{"hole_count", 7}, {"hole_px", 90}, {"hole_max_px", 30}});
-  seen.update(json{{"interior_count", 50}, {"holes_given", given}});
-  out.update(json{{"time_h", 200.0}, {"last_seq", 9}, {"digest", "abc123"}, {"um_per_px", 0.5}, {"px_per_cell_diameter", 30.0}, {"cell_count", 180}, {"colony", {{"area_um2", 1.0}}}, {"cells", json::object()},
+  seen.update(json{{"interior_count", 50}, {"holes_given", given}, {"not_judged", nullptr}});
+  out.update(json{{"time_h", 200.0}, {"last_seq", 9}, {"digest", "abc123"}, {"um_per_px", 0.5}, {"px_per_cell_diameter", 30.0}, {"cell_count", 180}, {"visible_cell_count", 180}, {"colony", {{"area_um2", 1.0}}}, {"cells", json::object()},
                   {"apart", json::object()}, {"packing", json::object()}, {"growth", json::object()},
                   {"sibling_straightness", json::object()}, {"rings", json::array()}, {"neighbours", seen}});
   return out;
 }
 json picture_analysis() {
   json result = measured_lines();
-  const json row = {{"threshold", 60}, {"walls", {{"d0", dimension(1.31)}, {"crossover", true}, {"reason", nullptr}}},
-                    {"outline", {{"d0", nullptr}, {"crossover", nullptr}, {"reason", "has no foreground"}}}};
+  const json row = {{"threshold", 60}, {"walls", {{"d0", dimension(1.31)}, {"finding", "crossover"}, {"crossover", false}, {"reason", nullptr}}},
+                    {"outline", {{"d0", nullptr}, {"finding", "no_figures"}, {"crossover", nullptr}, {"reason", "has no foreground"}}}};
   result["threshold_sweep"] = {{"sides_px", {3, 96}}, {"rows", {row}}};
   result["segmentation"] = {{"object_count", 315}, {"pipeline", "nuclei"}, {"pipeline_reason", "chosen: an even ground"}, {"threshold", 64},
                             {"area_mean_px", 150.25}, {"foreground_share", 0.25}, {"foreground", "light"}, {"foreground_reason", "asked for"},
-                            {"sweep", json::array()}};
+                            {"sweep", json::array()}, {"doubt", "Warning: there may be nothing in this picture."}, {"hole_max_px", 90}, {"area_mean_um2", 63.48}, {"density_per_mm2", nullptr}};
+  result["object_kind"] = "nuclei";
+  result["object_count"] = 315;
+  result["verdict"].insert(result["verdict"].begin(), "Warning: there may be nothing in this picture.");
   result["image"] = {{"um_per_px", 0.65}, {"um_per_px_source", "ome"}, {"notes", {"one <note>"}}};
   result["steps"] = {{{"name", "grey"}}, {{"name", "overlay"}}};
   return {{"id", kAnalysis}, {"name", "HT29"}, {"state", "succeeded"}, {"created_at", "2026-01-02T03:04:05Z"}, {"media_type", "image/tiff"},
@@ -85,7 +90,8 @@ TEST_F(Cli, ReportIsOnePageWithEverythingInIt) {
   EXPECT_THAT(page, HasSubstr("&lt;b&gt;plate&lt;/b&gt;"));
   EXPECT_THAT(page, HasSubstr("a crossover, not &lt;scaling&gt;."));
   EXPECT_THAT(page, HasSubstr("<td class=n>1.437</td><td class=n>0.037</td>"));
-  EXPECT_THAT(page, HasSubstr("control hexagonal, outline"));
+  EXPECT_THAT(page, HasSubstr("control hexagonal, colony outline"));
+  EXPECT_THAT(page, HasSubstr("too small a range for a finding"));
   EXPECT_THAT(page, HasSubstr("src=\"data:image/png;base64,iVBORwB4\""));
   EXPECT_THAT(page, Not(HasSubstr("<script")));
   EXPECT_THAT(page, HasSubstr("abc123"));  // the digest
@@ -105,11 +111,17 @@ TEST_F(Cli, AnalyzeTellsTheChoicesTheSweepAndWhatFollows) {
   EXPECT_EQ(run({"analyze", path("p.tif"), "--objects", path("o.csv"), "--html", path("a.html"), "--foreground", "light"}), 0) << err();
   EXPECT_EQ(server.requests().at(0).line(), "POST /v1/analyses?foreground=light HTTP/1.1");
   EXPECT_EQ(server.requests().at(0).header("Content-Type"), "image/tiff");
-  EXPECT_THAT(out(), HasSubstr("315 objects (nuclei, threshold 64)"));
+  EXPECT_THAT(out(), HasSubstr("315 nuclei (nuclei, threshold 64)"));
   EXPECT_THAT(out(), HasSubstr("pipeline nuclei, chosen: an even ground\nforeground light, asked for\n"));
   EXPECT_THAT(out(), HasSubstr("scale 0.6500 um a pixel, by the file's OME metadata\nnote: one <note>\n"));
-  EXPECT_THAT(out(), HasSubstr("walls D0    1.44 (se 0.037, boxes of 3 to 96 px, a crossover)\n"));
-  EXPECT_THAT(out(), HasSubstr("  threshold 60: walls 1.31 (se 0.037, boxes of 3 to 96 px, a crossover), outline none: has no foreground\n"));
+  EXPECT_THAT(out(), HasSubstr("outlines of the nuclei: D0 1.44 (se 0.037, boxes of 3 to 96 px, a crossover, not scaling)\n"));
+  EXPECT_THAT(out(), HasSubstr("outer outline: D0 1.09 (se 0.037, boxes of 3 to 96 px, too small a range for a finding)\n"));
+  EXPECT_THAT(out(), HasSubstr("  threshold 60: outlines of the nuclei D0 1.31 (se 0.037, boxes of 3 to 96 px, a crossover, not scaling), outer outline D0 none: has no "
+                               "foreground\n"));
+  EXPECT_THAT(out(), HasSubstr("against the threshold, in one grid from the frame's corner"));
+  const std::size_t told = out().find("Warning: there may be nothing");
+  EXPECT_LT(told, out().find("outer outline: D0")) << "before the figures";
+  EXPECT_EQ(out().find("Warning: ", told + 1), std::string::npos) << "and once";
   EXPECT_THAT(out(), HasSubstr("- The cell walls: a crossover"));
   EXPECT_EQ(read_file("o.csv"), "object_id,area_px\r\n1,9\r\n");
   const std::size_t before = server.requests().size();
@@ -122,6 +134,20 @@ TEST_F(Cli, AnalyzeTellsTheChoicesTheSweepAndWhatFollows) {
   EXPECT_THAT(page, HasSubstr("<td class=n>60</td><td class=n>1.310</td>"));
   EXPECT_THAT(page, HasSubstr("has no foreground"));
   EXPECT_THAT(page, HasSubstr("one &lt;note&gt;"));
+  // Nobody saw walls of cells or a colony: legend, tables and sweep call the lines what the sentences call them.
+  EXPECT_THAT(page, HasSubstr(">outlines of the nuclei</text>"));
+  EXPECT_THAT(page, HasSubstr("<th>outlines of the nuclei: D0</th>"));
+  EXPECT_THAT(page, HasSubstr("<th>control hexagonal, outlines of the nuclei</th>"));
+  const std::string own = page.substr(page.find("</ul>"));  // the fake server's sentence speaks of walls
+  EXPECT_THAT(own, Not(HasSubstr("cell walls")));
+  EXPECT_THAT(own, Not(HasSubstr("colony outline")));
+  // Sizes in um, what is in both units once, and no row of nulls.
+  EXPECT_THAT(page, HasSubstr("largest hole given away</th><td>38.03 um2"));
+  EXPECT_THAT(page, HasSubstr("mean area</th><td>63.48 um2"));
+  EXPECT_THAT(page, Not(HasSubstr("150.25")));
+  EXPECT_THAT(page, HasSubstr("um a pixel</th><td>0.65<"));
+  EXPECT_THAT(page, Not(HasSubstr("null")));
+  EXPECT_THAT(page, HasSubstr("in one grid from the frame's corner"));
 }
 
 TEST_F(Cli, CompareShowsBothSidesAndKeepsTheFigure) {
@@ -146,6 +172,34 @@ TEST_F(Cli, CompareShowsBothSidesAndKeepsTheFigure) {
   EXPECT_EQ(run({"compare", kId, kAnalysis, "--cell-count", "3.5"}), 2);
   EXPECT_EQ(run({"compare", kId, kAnalysis, "--cell-area-px", "120.5"}), 0) << err();
   EXPECT_EQ(json::parse(server.requests().back().body)["cell_area_px"], 120.5);
+}
+
+TEST_F(Cli, MeasureSaysHowManyCellsAreHiddenAndCountsOne) {
+  json answer = job_analysis();
+  FakeServer server([&answer](const FakeRequest&, const FakeConnection& to) { to.send(json_answer(200, answer.dump())); });
+  use(server);
+  answer["visible_cell_count"] = 150;
+  EXPECT_EQ(run({"measure", kId}), 0) << err();
+  EXPECT_THAT(out(), StartsWith("180 cells at 200.00 h, 150 of them seen from above\ncell walls: D0 1.44 ("));
+  answer["cell_count"] = answer["visible_cell_count"] = 1;
+  EXPECT_EQ(run({"measure", kId}), 0) << err();
+  EXPECT_THAT(out(), HasSubstr("1 cell at 200.00 h\n"));
+}
+
+TEST(ReportFacts, NumbersHaveFourDigitsThatCount) {
+  EXPECT_EQ(rounded(204.90388457792895), "204.9");
+  EXPECT_EQ(rounded(0.00022239622863492336), "0.000222");
+  EXPECT_EQ(rounded(12345.6), "12346");
+  EXPECT_EQ(rounded(1.5), "1.5");
+  EXPECT_EQ(rounded(3.0), "3");
+  EXPECT_EQ(rounded(-12.3456), "-12.35");
+  EXPECT_EQ(rounded(0.0), "0");
+  EXPECT_EQ(with_unit("radius_mean_px", 100.0, 0.5), "50 um");
+  EXPECT_EQ(with_unit("covered_px", 100, 0.5), "25 um2");
+  EXPECT_EQ(with_unit("covered_px", 100, {}), "100 px");
+  EXPECT_EQ(with_unit("doubling_time_h", 14.87654, {}), "14.88 h");
+  EXPECT_EQ(title_of("radius_mean_px"), "mean radius");
+  EXPECT_EQ(title_of("hull_area_px"), "hull area");
 }
 
 TEST_F(Cli, MeshAndCellsAreFiles) {

@@ -1,6 +1,7 @@
 #include "engine/analysis/contour.hpp"
 
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 #include <gmock/gmock.h>
@@ -101,6 +102,69 @@ TEST(Report, ControlsStandBesideTheAnswerAndTheCrossoverIsSaid) {
   EXPECT_NE(report.verdict[1].find("give the same within errors and bias"), std::string::npos) << report.verdict[1];
 }
 
+TEST(Report, HiddenCellsAreCountedAndNotMeasured) {
+  // A sheet of 169 whole cells over 30 more, of which one shows by a sliver of 25 pixels and one by a single pixel.
+  LabelImage labels = *hexagonal_control(areas_of(169, 1600, 0), 0.25);
+  const LabelImage sheet = labels;
+  std::vector<LabelArea> whole;
+  for (std::uint32_t label = 1; label <= 199; ++label) whole.push_back({label, 1600});
+  std::size_t shown = 0;
+  for (std::size_t at = 0; at < labels.values.size() && shown < 26; ++at) {
+    if (labels.values[at] != 0) labels.values[at] = shown++ < 25 ? 180 : 190;
+  }
+  LabelInput input;
+  input.labels = &labels;
+  input.whole = whole;
+  const LabelReport report = *analyse_labels(input);
+  EXPECT_EQ(report.cell_count, 199u);
+  EXPECT_EQ(report.visible_count, 171u);
+  EXPECT_EQ(report.partly_hidden_count, 2u);
+  EXPECT_EQ(report.measured_count, 169u);
+  std::uint64_t in_rings = 0;
+  for (const Ring& ring : report.rings) {
+    in_rings += ring.cell_count;
+    if (ring.cell_count > 0) {
+      EXPECT_NEAR(ring.area_mean_px, 1600.0, 60.0);
+    }
+  }
+  EXPECT_EQ(in_rings, 171u);
+  EXPECT_LT(report.apart.other_area_cv, 0.03) << "slivers are in no mean";
+  const std::string words = std::accumulate(report.verdict.begin(), report.verdict.end(), std::string());
+  EXPECT_NE(words.find("Of the colony's 199 cells, 28 are hidden under others: the figures of the picture are about the 171 that"), std::string::npos) << words;
+  EXPECT_NE(words.find("Of 2 cells less than half is seen"), std::string::npos) << words;
+  EXPECT_NE(words.find("not held against Gibson's table: the table is of a sheet"), std::string::npos) << words;
+  EXPECT_EQ(words.find("against Gibson's table p"), std::string::npos) << words;
+  // The sheet alone is judged by it.
+  whole.resize(169);
+  input.labels = &sheet;
+  input.whole = whole;
+  const LabelReport plain = *analyse_labels(input);
+  EXPECT_EQ(plain.sides_reason, "");
+  EXPECT_EQ(plain.cell_count, plain.visible_count);
+  EXPECT_TRUE(hidden_sentences(plain).empty());
+}
+
+TEST(Report, OfOneCellNothingFollows) {
+  LabelImage one(600, 600);
+  draw_discs({{1, 300.0, 300.0, 250.0}}, one);
+  LabelInput input;
+  input.labels = &one;
+  input.without_noise = &one;
+  const LabelReport report = *analyse_labels(input);
+  ASSERT_TRUE(report.lines.walls.dimensions);
+  for (const LineFinding* finding : {&report.findings.walls, &report.findings.outline}) {
+    EXPECT_EQ(finding->finding, Finding::kTooFew);
+    EXPECT_TRUE(finding->like_controls.empty());
+  }
+  const std::string words = std::accumulate(report.verdict.begin(), report.verdict.end(), std::string());
+  EXPECT_NE(words.find("too few for a finding: 1 object was counted, and fewer than 10 say"), std::string::npos) << words;
+  EXPECT_NE(words.find("Controls of fewer than 10 cells show nothing"), std::string::npos) << words;
+  for (const char* wrong : {"consistent with scaling", "tile it", "gives the same", "give the same"}) EXPECT_EQ(words.find(wrong), std::string::npos) << words;
+  // A region holds many cells: its outline is that of a colony, and one is enough.
+  input.objects = ObjectKind::kRegions;
+  EXPECT_NE(analyse_labels(input)->findings.outline.finding, Finding::kTooFew);
+}
+
 TEST(Report, WhatCannotBeMeasuredSaysWhy) {
   const LabelImage tiny = drawn({".....", ".aab.", ".aab.", "....."});
   LabelInput input;
@@ -126,7 +190,7 @@ TEST(Sweep, EveryThresholdIsCountedWithTheSameBoxes) {
       cone.at(row, column) = static_cast<std::uint8_t>(std::max(0.0, 255.0 - 0.85 * std::sqrt(dx * dx + dy * dy)));
     }
   }
-  ThresholdLines lines({});
+  ThresholdLines lines({}), as_regions({});
   for (const int threshold : {120, 40, 80, 160}) {  // the answer's own first, as `segment` calls
     BinaryImage disc(600, 600);
     LabelImage one(600, 600);
@@ -135,8 +199,9 @@ TEST(Sweep, EveryThresholdIsCountedWithTheSameBoxes) {
       one.values[i] = disc.values[i] != 0 ? 1 : 0;
     }
     lines.add({threshold, Pipeline::kNuclei, disc, one});
+    as_regions.add({threshold, Pipeline::kPhase, disc, one});
   }
-  const ThresholdSweep sweep = lines.finish();
+  const ThresholdSweep sweep = lines.finish(), regions = as_regions.finish(ObjectKind::kRegions);
   ASSERT_EQ(sweep.rows.size(), 4u);
   int last = 0;
   for (const ThresholdRow& row : sweep.rows) {
@@ -148,8 +213,13 @@ TEST(Sweep, EveryThresholdIsCountedWithTheSameBoxes) {
       EXPECT_NEAR(line->dimensions->capacity.value, 1.0, 0.1);
     }
   }
-  ASSERT_EQ(sweep.sentences.size(), 2u);
-  EXPECT_NE(sweep.sentences[0].find("Threshold 40 to 160: the cell walls could be counted at 4 of 4 levels"), std::string::npos);
+  ASSERT_EQ(sweep.sentences.size(), 3u);
+  EXPECT_NE(sweep.sentences[0].find("Threshold 40 to 160: the cell walls could be counted at 4 of 4 levels, with D0 for boxes of 3 to "),
+            std::string::npos) << sweep.sentences[0];
+  EXPECT_NE(sweep.sentences[2].find("one grid from the frame's corner"), std::string::npos);
+  // One disc a level is too few for a finding at any of them; regions are not counted so.
+  EXPECT_EQ(finding_of(sweep.rows[1].walls), Finding::kTooFew);
+  EXPECT_EQ(regions.rows[1].walls.object_count, std::nullopt);
 }
 
 TEST(Sweep, SaysWhereTheValueIsTheThresholdsAndWhereNothingCanBeCounted) {

@@ -135,7 +135,7 @@ TEST(Controls, OfAPictureAreSpreadWhereItsObjectsStandApartAndHaveItsBoxes) {
   }
   // A square lattice is nearly the hexagonal one: packed together the same discs had 1.3 to 1.5.
   EXPECT_NEAR(matched.reports[0].lines.walls.dimensions->capacity.value, lines.walls.dimensions->capacity.value, 0.08);
-  EXPECT_THAT(control_sentences(ObjectKind::kNuclei, matched.cover).back(), ::testing::HasSubstr("outlines of single nuclei"));
+  EXPECT_THAT(control_sentences(ObjectKind::kNuclei, matched.cover, 100).back(), ::testing::HasSubstr("outlines of single nuclei"));
   const LabelImage packed = *hexagonal_control(areas_of(61, 900, 0));
   EXPECT_EQ(matched_controls(packed, analyse_lines(packed, 0, {}), 1, {}).reports[0].placement, Placement::kTouching);
 }

@@ -76,6 +76,29 @@ TEST(Plot, AxesAreLogarithmicBothWays) {
   }
 }
 
+TEST(Plot, ADashedCurveShowsTheOneItLiesOn) {
+  const MeasuredLine walls = power_law(60'000.0, 1.5);
+  const Ink green{0x2c, 0xa0, 0x2c};
+  const std::vector<Curve> curves{{"cell walls", &walls, &walls, api::kBlackInk}, {"control, without noise", &walls, &walls, green, true, true}};
+  api::Axes axes;
+  axes.take(curves[0]);
+  api::SlopeRange range;
+  range.take(curves[0]);
+  Canvas counts(900, 600), slopes(900, 600);
+  api::draw_counts(counts, kPanel, axes, curves);
+  api::draw_slopes(slopes, kPanel, axes, range, curves);
+  for (const Canvas* canvas : {&counts, &slopes}) {
+    const StepImage image = canvas->picture();
+    std::int64_t black_px = 0, green_px = 0;
+    for (std::size_t i = 0; i < image.values.size(); i += 3) {
+      black_px += image.values[i] == 0 && image.values[i + 1] == 0 && image.values[i + 2] == 0 ? 1 : 0;
+      green_px += image.values[i] == green.red && image.values[i + 1] == green.green && image.values[i + 2] == green.blue ? 1 : 0;
+    }
+    EXPECT_GT(black_px, 150);
+    EXPECT_GT(green_px, 150);
+  }
+}
+
 TEST(Plot, CurvesLieWhereTheirPowerLawSaysInTheColoursOfTheLegend) {
   const MeasuredLine walls = power_law(60'000.0, 1.5), outline = power_law(4000.0, 1.0), hexagonal = power_law(300'000.0, 1.8), random = power_law(900.0, 1.2);
   const std::vector<Curve> curves{{"cell walls", &walls, &walls, {0, 0, 0}, false},

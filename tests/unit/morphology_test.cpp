@@ -210,6 +210,29 @@ TEST(Sides, AHoleIsSharedFairlyAndALargeOneStays) {
   EXPECT_THROW((void)find_contacts(image, 0, &stop), Stopped);
 }
 
+/// What the header says of circularities above 1: discs, ellipses and octagons at all places of the grid.
+TEST(Shapes, CircularityExceedsOneByPixelsAndByOctagonsOnly) {
+  double most = 0.0;
+  for (int k = 0; k < 3000; ++k) {
+    const double radius = 1.2 + 14.0 * (k % 50) / 50.0, x0 = 20.0 + 0.13 * (k % 7), y0 = 20.0 + 0.17 * (k % 5);
+    LabelImage image(40, 40);
+    for (std::int64_t row = 0; row < 40; ++row) {
+      for (std::int64_t column = 0; column < 40; ++column) {
+        const double dx = std::abs(static_cast<double>(column) + 0.5 - x0), dy = std::abs(static_cast<double>(row) + 0.5 - y0);
+        const bool is_octagon = k % 2 == 0 && std::max(dx, dy) <= radius && dx + dy <= (1.2 + 0.05 * (k % 9)) * radius;
+        if (is_octagon || (k % 2 == 1 && dx * dx + dy * dy <= radius * radius)) image.at(row, column) = 1;
+      }
+    }
+    const Shape shape = cell_shapes(image)->front();
+    if (shape.area_px >= 5) most = std::max(most, shape.circularity);
+    EXPECT_EQ(shape.is_measured, shape.area_px >= kShapePxMin);
+  }
+  EXPECT_GT(most, 1.055);
+  EXPECT_LT(most, 1.085);
+  EXPECT_NEAR(cell_shapes(drawn({"...", ".a.", "..."}))->front().circularity, 1.748, 0.001);
+  EXPECT_NEAR(cell_shapes(drawn({"....", ".aa.", ".aa.", "...."}))->front().circularity, 1.199, 0.001);
+}
+
 TEST(Sides, TheVerdictSaysWhichCountToCompare) {
   SideStatistics seen;
   seen.counts = {30, 40, 20, 5, 0, 0};

@@ -176,6 +176,12 @@ TEST(Segment, PhaseFindsTexturedRegionsWithTheWindowsReachTakenBack) {
   EXPECT_NEAR(static_cast<double>(result.foreground_px), truth, 2 * std::numbers::pi * 70 * 1.5);
 }
 
+TEST(Segment, WhatIsThereRaisesNoDoubt) {
+  double area_px = 0.0;
+  EXPECT_EQ(segment(nuclei_scene(1, &area_px), {.pipeline = Pipeline::kNuclei})->doubt, "");
+  EXPECT_EQ(segment(phase_scene(), {.pipeline = Pipeline::kPhase})->doubt, "");
+}
+
 TEST(Segment, ADishIsFoundByItsWallAndOnlyItsInsideIsLookedAt) {
   GreyImage image(400, 400, {}, 0);
   draw(image, {200, 200, 190}, 100);

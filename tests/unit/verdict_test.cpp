@@ -74,9 +74,9 @@ TEST(Verdict, AControlWithTheSameValueTakesTheMeaningFromIt) {
   EXPECT_EQ(found.finding, Finding::kScaling);
   EXPECT_THAT(found.like_controls, ElementsAre("without_noise"));
   EXPECT_THAT(found.unlike_controls, ElementsAre("hexagonal"));
-  EXPECT_THAT(text_of(found), HasSubstr("The control without_noise (" + with_error(again.dimensions->capacity) + ") gives the same within errors and bias, "
+  EXPECT_THAT(text_of(found), HasSubstr("The control without_noise (" + with_error(again.dimensions->capacity) + " for " + boxes_of(*again.dimensions) + ") gives the same within errors and bias, "
                                         "so the value says nothing about a fractal nature"));
-  EXPECT_THAT(text_of(found), HasSubstr("The control hexagonal (" + with_error(lattice.dimensions->capacity) + ") differs"));
+  EXPECT_THAT(text_of(found), HasSubstr("The control hexagonal (" + with_error(lattice.dimensions->capacity) + " for " + boxes_of(*lattice.dimensions) + ") differs"));
   EXPECT_THAT(text_of(found), HasSubstr("a control that is not has the same value"));
   const LineFinding crossover = judged(lattice, {{"hexagonal", &lattice}, {"random_discs", &lattice}});
   EXPECT_THAT(text_of(crossover), HasSubstr("The controls hexagonal (1."));
@@ -97,6 +97,22 @@ TEST(Verdict, LessThanADecadeIsTooSmallARange) {
   ASSERT_TRUE(lattice.dimensions->crossover.found);
   EXPECT_EQ(judged(lattice).finding, Finding::kShortRange);
   EXPECT_THAT(judged(lattice).sentences.front(), HasSubstr("and even there the local slopes rise from"));
+}
+
+TEST(Verdict, FewerThanTenThingsHaveNoFindingWhateverTheirSlopes) {
+  MeasuredLine koch = counted(koch_curve(1000));
+  ASSERT_EQ(finding_of(koch), Finding::kScaling) << "a set from elsewhere has no number";
+  koch.object_count = kObjectsMin;
+  EXPECT_EQ(finding_of(koch), Finding::kScaling);
+  koch.object_count = kObjectsMin - 1;
+  EXPECT_EQ(finding_of(koch), Finding::kTooFew);
+  const LineFinding found = judged(koch, {{"hexagonal", &koch}});
+  EXPECT_EQ(name_of(found.finding), "too_few");
+  ASSERT_EQ(found.sentences.size(), 1u);
+  EXPECT_THAT(found.sentences.front(), HasSubstr("9 objects were counted"));
+  EXPECT_THAT(found.sentences.front(), HasSubstr(boxes_of(*koch.dimensions)));
+  EXPECT_THAT(found.like_controls, IsEmpty());
+  EXPECT_EQ(up_to(koch, 100).object_count, koch.object_count);
 }
 
 TEST(Verdict, SlopesThatGoUpAndDownAreNoScaling) {
