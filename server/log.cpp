@@ -40,24 +40,26 @@ LogLine log_event(LogFormat format, std::string_view time, std::string_view leve
 // Whatever a client has chosen is searched for secrets: it may have put one in the wrong place.
 LogLine log_access(LogFormat format, std::string_view time, const http::AccessRecord& record) {
   if (format == LogFormat::kText) {
-    const std::string text = record.method + " " + record.path + " " + std::to_string(record.status) + " " +
+    const std::string text = record.method + " " + record.path + " " + std::to_string(record.status) + (record.peer_left ? " peer left " : " ") +
                              std::to_string(record.duration_us) + " us " + std::to_string(record.body_bytes) + " B " +
                              (record.actor.empty() ? "-" : record.actor) + " " + record.remote + " [" + record.request_id + "]";
     return {"info", plain(safe(text))};
   }
   const auto text_or_null = [](const std::string& text) { return text.empty() ? Json(nullptr) : Json(safe(text)); };
-  return json_line("info", {{"time", time},
-                            {"level", "info"},
-                            {"event", "request"},
-                            {"request_id", safe(record.request_id)},
-                            {"remote", record.remote},
-                            {"method", safe(record.method)},
-                            {"path", safe(record.path)},
-                            {"status", record.status},
-                            {"duration_us", record.duration_us},
-                            {"bytes", record.body_bytes},
-                            {"actor", text_or_null(record.actor)},
-                            {"token_id", text_or_null(record.token_id)}});
+  Json line = {{"time", time},
+               {"level", "info"},
+               {"event", "request"},
+               {"request_id", safe(record.request_id)},
+               {"remote", record.remote},
+               {"method", safe(record.method)},
+               {"path", safe(record.path)},
+               {"status", record.status},
+               {"duration_us", record.duration_us},
+               {"bytes", record.body_bytes},
+               {"actor", text_or_null(record.actor)},
+               {"token_id", text_or_null(record.token_id)}};
+  if (record.peer_left) line["peer_left"] = true;
+  return json_line("info", line);
 }
 
 LogLine log_failure(LogFormat format, std::string_view time, const http::Request& request, std::string_view what) {

@@ -34,6 +34,7 @@ extern char** environ;
 namespace colony::server {
 namespace {
 
+constexpr int kWrongConfiguration = 2;  // to exit with
 constexpr std::size_t kLogLinesMax = 8192;
 constexpr std::chrono::seconds kLogEnd{2};
 constexpr std::int64_t kGrace_ms = 5'000;  // for answers under way; with the runners' end well within the 10 s promised
@@ -176,7 +177,10 @@ int serve(const Config& config, const sigset_t& signals) {
   http_config.large_body_path = "/v1/analyses";
   auto server = http::Server::create(http_config, router, tokens,
                                      [&log](const http::AccessRecord& record) { log.access(record); });
-  if (!server) return log.fail("cannot listen", server.error());
+  if (!server) {
+    const int status = log.fail("cannot serve", server.error());
+    return server.error().code == ErrorCode::kInvalid ? kWrongConfiguration : status;
+  }
   // Only now: a process that cannot serve must not take up jobs.
   if (const Status started = jobs->start(); !started) return log.fail("cannot take up the jobs", started.error());
   if (const Status started = api.start(); !started) return log.fail("cannot take up the analyses", started.error());
@@ -210,7 +214,7 @@ int run(int argc, char** argv) {
                                     usable_cores());
   if (!invocation) {
     spdlog::error("{}", text_of(invocation.error(), "\n  "));
-    return 2;
+    return kWrongConfiguration;
   }
   if (!invocation->print.empty()) {
     std::fputs(invocation->print.c_str(), stdout);

@@ -62,9 +62,10 @@ http::Response run_endpoint(const Endpoint& endpoint, Context& context, const ht
     if (!response.later) apply_conditions(endpoint, call, response);
     return response;
   } catch (const Stopped&) {
-    return problem_response(
-        {ErrorCode::kUnavailable, "the server is ending; the work was given up, nothing was stored"},
-        request.request_id);
+    http::Response response = problem_response(
+        {ErrorCode::kUnavailable, "the server is ending; the work was given up, nothing was stored"}, request.request_id);
+    response.gave_up = true;
+    return response;
   }
 }
 

@@ -7,6 +7,7 @@
 
 #include "server/api/api.hpp"
 #include "server/api/schema.hpp"
+#include "server/http/admission.hpp"
 #include "server/store/identity.hpp"
 
 namespace colony::server::api {
@@ -44,6 +45,13 @@ Result<http::KnownToken> known(const TokenRow& row) {
   const auto expires = unix_ms_of(row.expires_at);
   if (!scope || !expires) return Error{ErrorCode::kStorage, "the stored token " + row.id + " cannot be read"};
   return http::KnownToken{row.id, row.name, *scope, row.secret_hash, *expires};
+}
+
+/// With tokens_mutex held, so that no removal can come between this and what follows: 401 for a token that has ended since it was let in.
+std::optional<http::Response> refuse_ended(const Context& context, const Call& call) {
+  const std::string& token_id = call.request.principal.token_id;
+  if (token_id.empty() || context.tokens.is_alive(token_id, http::unix_time_ms())) return std::nullopt;
+  return http::answer_of(http::token_has_ended(), call.request.request_id);
 }
 
 /// Whether this token is valid, an admin's, and no other will be for another kSpareAdminLife_h: one that ends in a moment would let
@@ -138,6 +146,7 @@ http::Response post_token(Context& context, const Call& call) {
   if (!wish) return failure(wish.error(), call);
   // Store and table change together: else a removal in between would be undone in the table.
   const std::lock_guard lock(context.tokens_mutex);
+  if (auto refused = refuse_ended(context, call)) return std::move(*refused);
   const auto created = create_token(context.jobs.store().tokens(), *wish, call.request.principal.name);
   if (!created) return failure(created.error(), call);
   for (const TokenRow& old : created->removed) {
@@ -164,6 +173,7 @@ http::Response get_tokens(Context& context, const Call& call) {
 
 http::Response delete_token(Context& context, const Call& call) {
   const std::lock_guard lock(context.tokens_mutex);
+  if (auto refused = refuse_ended(context, call)) return std::move(*refused);
   // Where nobody needs a token (or asks as nobody's token), nobody can be locked out.
   if (!call.request.principal.token_id.empty()) {
     const auto rows = context.jobs.store().tokens().list();

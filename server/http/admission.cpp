@@ -70,6 +70,14 @@ ClientAddress forwarded_address(const Headers& headers, const ClientAddress& pee
 
 Refusal token_has_ended() { return unauthorized("the token has ended meanwhile", "invalid_token"); }
 
+Response answer_of(const Refusal& refusal, std::string_view request_id) {
+  Response response = problem(refusal.status, refusal.code, refusal.title, refusal.detail, request_id);
+  if (refusal.status == 503) response.headers.set("Retry-After", "1");
+  if (refusal.retry_after_s > 0) response.headers.set("Retry-After", std::to_string(refusal.retry_after_s));
+  if (!refusal.challenge.empty()) response.headers.set("WWW-Authenticate", refusal.challenge);
+  return response;
+}
+
 Admission::Admission(AdmissionConfig config, const TokenTable& tokens)
     : config_(config),
       tokens_(tokens),

@@ -42,6 +42,8 @@ ClientAddress forwarded_address(const Headers& headers, const ClientAddress& pee
 
 /// 401 for a token that was good when the request came.
 Refusal token_has_ended();
+/// The problem document, with the fields that go with it.
+Response answer_of(const Refusal& refusal, std::string_view request_id);
 
 class Admission {
  public:

@@ -10,7 +10,6 @@ namespace asio = boost::asio;
 using boost::system::error_code;
 namespace {
 
-constexpr std::size_t kReadAheadBytesMax = 8 * 1024;
 constexpr std::size_t kReadAheadStepBytes = 2 * 1024;
 constexpr std::int64_t kLingerMs = 2'000;
 constexpr std::size_t kLingerStepBytes = 64 * 1024;
@@ -127,7 +126,7 @@ void Connection::notify() { signal_.cancel(); }
 
 void Connection::watch_peer() {
   if (watching_ || peer_has_left_ || !socket_.is_open()) return;
-  if (!peer_has_closed_ && input_.size() >= kReadAheadBytesMax) return;
+  if (!peer_has_closed_ && peer_sends_too_much()) return;
   watching_ = true;
   // Behind the end of its input an error is all that can come, and that is a reset.
   const bool is_for_reset = peer_has_closed_;
@@ -157,11 +156,15 @@ void Connection::look_at_peer() {
   if (!socket_.is_open()) return;
   char bytes[kReadAheadStepBytes];
   error_code error;
-  // Neither blocks. Under TLS what came may be half a record: then it would block, too.
-  const std::size_t count =
-      tls_ ? tls_->read_some(asio::buffer(bytes), error) : socket_.read_some(asio::buffer(bytes), error);
-  if (!error) {
+  // To the end of what is there: under TLS the rest of a record is in memory, and the socket would not tell of it.
+  while (!error && !peer_sends_too_much()) {
+    // Neither blocks. Under TLS what came may be half a record: then it would block, too.
+    const std::size_t count =
+        tls_ ? tls_->read_some(asio::buffer(bytes), error) : socket_.read_some(asio::buffer(bytes), error);
     input_.append(bytes, count);
+  }
+  if (peer_sends_too_much()) {
+    notify();
   } else if (error != asio::error::would_block && error != asio::error::try_again) {
     peer_has_closed_ = true;
     peer_has_left_ = tls_ != nullptr || error != asio::error::eof;

@@ -33,6 +33,8 @@ class Connection : public std::enable_shared_from_this<Connection> {
   enum class Io { kDone, kTimeout, kClosed };
   using Clock = std::chrono::steady_clock;
 
+  static constexpr std::size_t kReadAheadBytesMax = 32 * 1024;
+
   /// `tls`: what to speak, and outlives the connection; null: nothing, the bytes go as they are.
   explicit Connection(boost::asio::ip::tcp::socket socket, boost::asio::ssl::context* tls = nullptr);
 
@@ -60,8 +62,8 @@ class Connection : public std::enable_shared_from_this<Connection> {
   Awaitable<void> wait(Clock::time_point until);
   void notify();
 
-  /// While nothing is read: notify() when the peer closes, and again when it has left. What it sends instead is kept in input(), up to
-  /// a bound; beyond that either is noticed at the next write.
+  /// While nothing is read: notify() when the peer closes, when it has left, and when it has sent more than is kept meanwhile in input().
+  /// Behind that the socket is not looked at any more: whether the peer is still there cannot be known then.
   void watch_peer();
   void unwatch_peer();
   /// Its input has ended: it is gone, or it has shut down its sending side only. TCP does not tell one from the other before something
@@ -70,6 +72,8 @@ class Connection : public std::enable_shared_from_this<Connection> {
   /// Nobody takes what is sent: after a reset, and under TLS after any end (RFC 5246, 7.2.1: who is told close_notify drops what it
   /// would still have written).
   bool peer_has_left() const { return peer_has_left_; }
+  /// More stands in input() than anybody needs to ask behind a request that is at work.
+  bool peer_sends_too_much() const { return input_.size() > kReadAheadBytesMax; }
 
   /// Ends our side and reads until the peer ends its own, for a short time: a close with unread bytes would send a
   /// reset, and that can reach the peer before it has read the answer.

@@ -146,6 +146,7 @@ Check read_addressee(std::string_view target, const GatePolicy& policy, RequestH
     auto parsed = parse_target(target);
     if (!parsed) return bad_request(parsed.error().message);
     head.target = std::move(*parsed);
+    if (head.target.is_bare && head.method == "OPTIONS") head.target.path = kServerTarget;  // RFC 9112, 3.2.4
   }
   if (head.target.authority) {
     if (!is_allowed(*head.target.authority, policy))

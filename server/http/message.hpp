@@ -96,6 +96,7 @@ struct Response {
   std::unique_ptr<BodySource> stream;                          // if set: sent chunked instead of body
   std::unique_ptr<LaterAnswer> later;                          // if set: nothing else counts, the answer comes from it
   std::string failure;                                         // with status 500: what failed, for the server's own log; not sent
+  bool gave_up = false;                                        // it ended because of Request::gives_up, and nothing was done
 };
 
 }  // namespace colony::server::http

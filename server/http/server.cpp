@@ -31,9 +31,7 @@ constexpr std::chrono::milliseconds kRefusedLinger{500};
 constexpr std::chrono::milliseconds kAcceptPause{100};
 
 Error config_error(std::string field, std::string message) {
-  Error error{ErrorCode::kInvalid, field + ": " + message};
-  error.fields.push_back({std::move(field), std::move(message)});
-  return error;
+  return {ErrorCode::kInvalid, "the configuration cannot be used", {{std::move(field), std::move(message)}}};
 }
 
 /// What would make a server that never answers, or a rule that never matches.
@@ -157,7 +155,7 @@ class BeastServer final : public Server {
     if (!error) acceptor_.set_option(asio::socket_base::reuse_address(true), error);
     if (!error) acceptor_.bind(endpoint, error);
     if (!error) acceptor_.listen(kConnectionsInBacklogMax, error);
-    if (error) return listen_error("cannot listen on " + to_text(endpoint) + ": " + error.message());
+    if (error) return Error{ErrorCode::kUnavailable, "cannot listen on " + to_text(endpoint) + ": " + error.message()};
     policy_.port = acceptor_.local_endpoint().port();
     for (const auto& host : config_.allowed_hosts) {
       std::string lower(host.size(), '\0');

@@ -50,7 +50,7 @@ struct ServerConfig {
   std::int64_t stream_keep_alive_ms = 15'000;  // of a stream that waits
 };
 
-/// In the log only: the peer had left, the work was given up or never begun. The number by which other servers' logs know it.
+/// In the log only: the peer had left, and the work was given up or never begun (what was done has its own status, and peer_left). The number by which other servers' logs know it.
 inline constexpr int kPeerHasLeft = 499;
 
 /// Called once per finished request, for the log (any thread).
@@ -60,12 +60,14 @@ struct AccessRecord {
   std::int64_t duration_us = 0;
   std::uint64_t body_bytes = 0;
   std::string actor, token_id;                 // empty: refused before it was known
+  bool peer_left = false;                      // nobody took the answer
 };
 
 class Server {
  public:
-  /// Binds and listens; `router` and `tokens` outlive it. Errors: kInvalid "server.listen" for an address that cannot be bound, or
-  /// that is not loopback without tokens and either TLS or a proxy that does it; "tls.certificate", "tls.key".
+  /// Binds and listens; `router` and `tokens` outlive it. Errors: kInvalid for a configuration that
+  /// cannot serve: "server.listen" for what is no address, or not loopback without tokens and either TLS or a proxy that does it;
+  /// "tls.certificate", "tls.key". kUnavailable for an address that cannot be bound now.
   static Result<std::unique_ptr<Server>> create(ServerConfig config, const Router& router, const TokenTable& tokens,
                                                 std::function<void(const AccessRecord&)> log);
   virtual ~Server() = default;

@@ -109,6 +109,7 @@ Awaitable<bool> Session::serve_one() {
   is_admitted_ = false;
   forwarded_.clear();
   sent_bytes_ = 0;
+  has_answer_ = false;
   bool goes_on = co_await read_head();
   if (!goes_on) co_return false;
   served_before_ = true;
@@ -120,6 +121,7 @@ Awaitable<bool> Session::serve_one() {
   if (!refusal_) {
     goes_on = co_await read_body();
     if (!goes_on) co_return false;
+    if (!refusal_ && token_is_over()) refusal_ = token_has_ended();
   }
   if (head_.request_id.empty()) head_.request_id = shared_.request_ids.next();
   request_.request_id = head_.request_id;
@@ -247,10 +249,7 @@ bool Session::fill_request() {
 
 void Session::prepare_response() {
   if (refusal_) {
-    response_ = problem(refusal_->status, refusal_->code, refusal_->title, refusal_->detail, head_.request_id);
-    if (refusal_->status == 503) response_.headers.set("Retry-After", "1");
-    if (refusal_->retry_after_s > 0) response_.headers.set("Retry-After", std::to_string(refusal_->retry_after_s));
-    if (!refusal_->challenge.empty()) response_.headers.set("WWW-Authenticate", refusal_->challenge);
+    response_ = answer_of(*refusal_, head_.request_id);
   } else if (const auto fault = fault_of(response_)) {
     let_go_of_stream();
     shared_.router.report_failure(request_, *fault);
@@ -261,14 +260,18 @@ void Session::prepare_response() {
 }
 
 Awaitable<bool> Session::answer() {
-  if (is_abandoned_) {
-    let_go_of_stream();
+  if (closing_ && !is_abandoned_) co_return false;
+  if (is_abandoned_ && !refusal_ && !has_answer_) {
     response_ = Response();
     response_.status = kPeerHasLeft;
-    write_log();
+  } else {
+    prepare_response();
   }
-  if (closing_) co_return false;
-  prepare_response();
+  if (is_abandoned_) {
+    let_go_of_stream();
+    write_log();
+    co_return false;
+  }
   WireOptions options;
   options.version_minor = head_.version_minor;
   options.request_id = head_.request_id;
@@ -316,6 +319,7 @@ void Session::write_log() const {
   record.body_bytes = sent_bytes_;
   record.actor = is_admitted_ || !request_.principal.token_id.empty() ? request_.principal.name : std::string();
   record.token_id = request_.principal.token_id;
+  record.peer_left = is_abandoned_;
   const auto duration = Connection::Clock::now() - begin_;
   record.duration_us = std::chrono::duration_cast<std::chrono::microseconds>(duration).count();
   shared_.log(record);

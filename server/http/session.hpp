@@ -2,10 +2,11 @@
 // Promises that nothing of a handler or a stream runs on an I/O thread but what is in memory already (pull_now); that every
 //          request is answered in order, or the connection is closed; that a stream holds a worker only while it is
 //          pulled, and is never pulled while its last piece is still being sent; that it ends soon after close(); and that
-//          nothing is begun for a peer that has left, and what was begun is asked to give up.
+//          nothing is begun for a peer that has left, and what was begun is asked to give up; and that nothing is begun for a
+//          token that has ended, however long the body was under way or the request waited.
 // Does not keep a connection after a refusal: where the next request begins is then a matter of trust.
 // Threads: start, drain and close from any thread; everything else on the connection's strand, but for the tasks of
-//          workers, which touch request_, response_ and piece_ while the session waits for them.
+//          workers, which touch request_, refusal_, response_, has_answer_ and piece_ while the session waits for them.
 #pragma once
 
 #include <atomic>
@@ -81,6 +82,7 @@ class Session : public std::enable_shared_from_this<Session> {
   Awaitable<void> wait_for_worker();
   Awaitable<void> wait_for_handler(WorkerPool::Ticket ticket);
   void abandon(WorkerPool::Ticket ticket);
+  bool peer_is_over() const { return connection_->peer_has_closed() || connection_->peer_sends_too_much(); }  // for who only waits
   Awaitable<void> wait_for_later();  // session_later.cpp
   void ask_later(bool is_first, bool is_last);
 
@@ -89,10 +91,13 @@ class Session : public std::enable_shared_from_this<Session> {
   void give_back_large_body();
   bool fill_request();
   bool is_question() const { return head_.method == "GET" || head_.method == "HEAD"; }
-  bool has_lost_its_token() const;  // a question that will not be answered any more
+  bool token_is_over() const;  // the one that was let in has been removed, or has expired
+  bool has_lost_its_token() const { return is_question() && token_is_over(); }  // will not be answered any more
+  void dispatch();
   void settle_answer();
   void answer_preflight();
-  WorkerPool::Task as_worker_task(std::function<void()> work);
+  /// Of a closed session only what it `must` do: nobody waits for the rest.
+  WorkerPool::Task as_worker_task(std::function<void()> work, bool must = false);
   void prepare_response();
   void pull_stream(bool is_first);
   bool pull_what_is_ready();
@@ -121,6 +126,7 @@ class Session : public std::enable_shared_from_this<Session> {
   Request request_;
   std::shared_ptr<std::atomic<bool>> gives_up_;  // of request_, once a worker has it
   bool is_abandoned_ = false;                    // its peer left before the answer
+  bool has_answer_ = false;                      // a handler went to its end, whoever takes what it said
   Response response_;
   bool keep_alive_ = false;
   bool holds_large_body_ = false;

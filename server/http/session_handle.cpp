@@ -15,10 +15,10 @@ constexpr std::string_view kCorsRequestHeaders =
 
 }  // namespace
 
-WorkerPool::Task Session::as_worker_task(std::function<void()> work) {
+WorkerPool::Task Session::as_worker_task(std::function<void()> work, bool must) {
   worker_is_done_ = false;
-  return [self = shared_from_this(), work = std::move(work)] {
-    if (!self->closing_) work();
+  return [self = shared_from_this(), work = std::move(work), must] {
+    if (must || !self->closing_) work();
     self->on_strand([self] {
       self->worker_is_done_ = true;
       self->connection_->notify();
@@ -38,7 +38,7 @@ Awaitable<void> Session::handle() {
   }
   gives_up_ = std::make_shared<std::atomic<bool>>(draining_);
   request_.gives_up = gives_up_;
-  auto task = as_worker_task([this] { response_ = shared_.router.dispatch(request_, destination_); });
+  auto task = as_worker_task([this] { dispatch(); });
   const WorkerPool::Ticket ticket = shared_.workers.submit_request(std::move(task), Router::is_heavy(destination_));
   if (ticket != 0) {
     co_await wait_for_handler(ticket);
@@ -49,6 +49,16 @@ Awaitable<void> Session::handle() {
   }
 }
 
+// On a worker. The request may have waited for it longer than its token lived.
+void Session::dispatch() {
+  if (token_is_over()) {
+    refusal_ = token_has_ended();
+    return;
+  }
+  response_ = shared_.router.dispatch(request_, destination_);
+  has_answer_ = !response_.gave_up && !response_.later;
+}
+
 // The end of its input alone does not say that the peer has left: it may have asked all that it wants to ask. So it is sent a 100, which any
 // client of HTTP/1.1 passes over (RFC 9110, 15.2), and which is answered with a reset if nobody is there.
 Awaitable<void> Session::wait_for_handler(WorkerPool::Ticket ticket) {
@@ -57,7 +67,8 @@ Awaitable<void> Session::wait_for_handler(WorkerPool::Ticket ticket) {
   bool was_asked = head_.version_minor == 0;  // knows no 100
   while (!worker_is_done_) {
     connection_->watch_peer();
-    bool has_left = connection_->peer_has_left();
+    // Behind too much of what it sends its end could not be seen, so that sending so much ends the request, too.
+    bool has_left = connection_->peer_has_left() || connection_->peer_sends_too_much();
     if (connection_->peer_has_closed() && !has_left && !was_asked && !closing_) {
       was_asked = true;
       const Connection::Io io = co_await connection_->write(kContinue, shared_.config.write_timeout_ms);
@@ -76,9 +87,9 @@ void Session::abandon(WorkerPool::Ticket ticket) {
   if (shared_.workers.withdraw(ticket)) worker_is_done_ = true;
 }
 
-bool Session::has_lost_its_token() const {
+bool Session::token_is_over() const {
   const std::string& token_id = request_.principal.token_id;
-  return is_question() && !token_id.empty() && !shared_.admission.tokens().is_alive(token_id, unix_time_ms());
+  return !token_id.empty() && !shared_.admission.tokens().is_alive(token_id, unix_time_ms());
 }
 
 // A token may have ended while the answer was made. What was done was done by right; what was found is not told any more.

@@ -35,10 +35,12 @@ Awaitable<void> Session::wait_for_later() {
   const bool ends_with_token = is_question() && !token_id.empty();
   const auto watch = ends_with_token ? tokens.watch(token_id, [waker = waker_] { waker->wake(); }) : nullptr;
   bool is_first = true;
-  bool is_last = false;
+  bool is_last = is_abandoned_;
   while (!has_lost_its_token()) {
     woken_ = false;  // before asking: a wake that comes meanwhile must lead to another question
-    auto task = as_worker_task([this, is_first, is_last] { ask_later(is_first, is_last); });
+    // Of what was done the log has the answer, also if nobody waits for it any more.
+    const bool is_for_log = is_abandoned_ && !is_question();
+    auto task = as_worker_task([this, is_first, is_last] { ask_later(is_first, is_last); }, is_for_log);
     shared_.workers.submit_pull(std::move(task));
     co_await wait_for_worker();
     is_first = false;
@@ -49,15 +51,13 @@ Awaitable<void> Session::wait_for_later() {
       look_at = std::min(look_at, Connection::Clock::now() + left);
     }
     connection_->watch_peer();
-    while (!woken_ && !closing_ && !draining_ && !connection_->peer_has_closed() && Connection::Clock::now() < look_at) {
+    while (!woken_ && !closing_ && !draining_ && !peer_is_over() && Connection::Clock::now() < look_at) {
       co_await connection_->wait(look_at);
     }
-    if (connection_->peer_has_closed()) {
-      is_abandoned_ = true;
-      close();
-    }
-    if (closing_) break;
-    is_last = draining_ || Connection::Clock::now() >= until;
+    is_abandoned_ = peer_is_over() && !closing_;
+    if (is_abandoned_) close();
+    if (closing_ && (!is_abandoned_ || is_question())) break;
+    is_last = is_abandoned_ || draining_ || Connection::Clock::now() >= until;
   }
   connection_->unwatch_peer();
   worker_is_done_ = false;
@@ -71,7 +71,10 @@ Awaitable<void> Session::wait_for_later() {
   co_await wait_for_worker();
   waker_->detach();
   waker_.reset();
-  if (late_) response_ = std::move(*late_);
+  if (late_) {
+    response_ = std::move(*late_);
+    has_answer_ = !response_.gave_up;
+  }
   late_.reset();
 }
 

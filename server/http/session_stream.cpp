@@ -80,7 +80,7 @@ Awaitable<bool> Session::send_stream(Framing framing) {
       auto until = silent_since + silence_max;
       if (wake_after_) until = std::min(until, Connection::Clock::now() + *wake_after_);
       co_await wait_for_stream(farewell, until);
-      if (closing_ || connection_->peer_has_closed()) co_return false;
+      if (closing_ || peer_is_over()) co_return false;
       const bool is_silent = !woken_ && !(draining_ && !farewell.empty());
       if (is_silent && Connection::Clock::now() >= silent_since + silence_max) {
         is_sent = co_await send_piece(framing, kNothing, response_.stream->keep_alive());
@@ -117,7 +117,7 @@ Awaitable<bool> Session::send_piece(Framing framing, std::string_view shared, st
 // Until the source wakes, the peer goes, the server drains or it is time for another pull or a sign of life.
 Awaitable<void> Session::wait_for_stream(std::string_view farewell, Connection::Clock::time_point until) {
   connection_->watch_peer();
-  while (!woken_ && !closing_ && !connection_->peer_has_closed() && !(draining_ && !farewell.empty()) &&
+  while (!woken_ && !closing_ && !peer_is_over() && !(draining_ && !farewell.empty()) &&
          Connection::Clock::now() < until) {
     co_await connection_->wait(until);
   }

@@ -132,6 +132,7 @@ Result<Target> parse_target(std::string_view text) {
     target.authority = parse_authority(authority);
     if (!target.authority) return malformed("the request target names no valid host");
     text.remove_prefix(authority.size());
+    target.is_bare = text.empty();
   }
   const auto question = text.find('?');
   auto path = decode_path(text.empty() || question == 0 ? std::string_view("/") : text.substr(0, question));

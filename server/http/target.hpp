@@ -30,9 +30,10 @@ struct Target {
   std::optional<Authority> authority;  // of the absolute form
   std::string path;
   std::vector<std::pair<std::string, std::string>> query;
+  bool is_bare = false;                // the absolute form of a host alone: its path, "/", was not written, and no query
 };
 
-/// What OPTIONS may have instead of a path: the server itself (RFC 9110, 9.3.7).
+/// What OPTIONS may have instead of a path: the server itself (RFC 9110, 9.3.7); a host alone is the same (RFC 9112, 3.2.4).
 inline constexpr std::string_view kServerTarget = "*";
 
 /// Origin form ("/v1/jobs?x=1") or absolute form with scheme http. In a query '+' is a space, as in HTML forms.

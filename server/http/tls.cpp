@@ -15,8 +15,7 @@ namespace {
 namespace ssl = boost::asio::ssl;
 
 Error tls_error(const char* field, const std::string& path, const std::string& why) {
-  const std::string message = "cannot use '" + path + "': " + why;
-  return {ErrorCode::kInvalid, std::string(field) + ": " + message, {{field, message}}};
+  return {ErrorCode::kInvalid, "the configuration cannot be used", {{field, "cannot use '" + path + "': " + why}}};
 }
 
 bool is_mismatch(const boost::system::error_code& error) {

@@ -71,13 +71,14 @@ TokenHash hash_of_token(std::string_view token) {
 // In either case of letters: who reads it can write it in the other.
 std::string without_tokens(std::string_view text) {
   constexpr std::size_t kPartDigits = 8;  // "colony_face" is no secret
+  constexpr std::size_t kIdDigitsMax = 32;  // of ids, cursors and digests
   std::string out;
   std::size_t at = 0;
   while (at < text.size()) {
     std::size_t end = at;
     while (end < text.size() && hex_value(text[end]) >= 0) ++end;
     const std::string_view before = std::string_view(out).substr(out.size() - std::min(out.size(), kPrefix.size()));
-    const bool is_secret = end - at >= 2 * kSecretBytes || (end - at >= kPartDigits && equals_without_case(before, kPrefix));
+    const bool is_secret = end - at > kIdDigitsMax || (end - at >= kPartDigits && equals_without_case(before, kPrefix));
     out += is_secret ? std::string_view("[hidden]") : text.substr(at, end - at);
     if (end < text.size()) out += text[end++];
     at = end;

@@ -30,8 +30,8 @@ using TokenHash = std::array<std::uint8_t, 32>;
 Result<std::string> new_token();
 bool is_token_text(std::string_view text);
 TokenHash hash_of_token(std::string_view token);
-/// `text` with every token in it made unreadable, also what is left of one without its beginning or its end: 64 hexadecimal digits in a
-/// row, or "colony_" and 8. For whatever goes into a log.
+/// `text` with every token in it made unreadable, also what is left of one without its beginning or its end: more than 32 hexadecimal
+/// digits in a row (which is what ids and digests have at most), or "colony_" and 8. For whatever goes into a log.
 std::string without_tokens(std::string_view text);
 
 std::string_view name_of(Scope scope);

@@ -4,9 +4,11 @@ import { execFileSync } from 'node:child_process';
 import net from 'node:net';
 import { join } from 'node:path';
 import test from 'node:test';
-import { send } from './harness/http.mjs';
+import tls from 'node:tls';
+import { send, sendRaw } from './harness/http.mjs';
 import { finishedJob, small } from './harness/jobs.mjs';
 import { startServer, temporaryFolder } from './harness/server.mjs';
+import { makeCertificate, sendTls } from './harness/tls.mjs';
 import { eventually, within } from './harness/wait.mjs';
 
 const logged = (server) => server.err.split('\n').slice(0, -1).map((line) => JSON.parse(line));
@@ -42,6 +44,47 @@ test('pictures for clients who left', async (t) => {
   const statuses = requests(server, '/image').map(({ status }) => status);
   assert.ok(statuses.filter((status) => status === 499).length >= 32, `${statuses}`);
   assert.equal(statuses.indexOf(200), clients.length, 'not one was drawn that nobody waited for');
+});
+
+// The one before it tells when the picture's header has been read. Then the bytes come, and then the client goes.
+for (const speaks of ['plain', 'TLS']) {
+  test(`bytes behind a request do not hide that its client has left (${speaks})`, async (t) => {
+    const isPlain = speaks === 'plain';
+    const { certificate, key } = makeCertificate(temporaryFolder(t));
+    const server = await startServer(t, { args: ['--log.format', 'json', ...(isPlain ? [] : ['--tls.certificate', certificate, '--tls.key', key])] });
+    const ask = (method, path, json) => (isPlain ? send(server.port, method, path, { json }) : sendTls(server.port, certificate, method, path, { json }));
+    const { json: { id } } = await ask('POST', '/v1/jobs', small(7, 60));
+    await eventually('the job to end', async () => (await ask('GET', `/v1/jobs/${id}`)).json.state === 'succeeded');
+    let expected = 0;
+    for (const size of [20_000, 70_000]) {
+      for (const leave of ['resetAndDestroy', 'destroy']) {
+        const socket = net.connect(server.port, '127.0.0.1');
+        const over = isPlain ? socket : tls.connect({ socket, rejectUnauthorized: false });
+        let answer = '';
+        over.on('data', (bytes) => { answer += bytes.toString('latin1'); });
+        for (const one of [socket, over]) one.on('error', () => {});  // the server may be the first to close
+        over.write(['/healthz', `/v1/jobs/${id}/image?width_px=8192`]
+          .map((path) => `GET ${path} HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n`).join(''));
+        await eventually('the first answer', () => answer.startsWith('HTTP/1.1 200 '));
+        await within(60_000, new Promise((done) => over.write('x'.repeat(size), done)), 'the bytes to be on their way');
+        socket[leave]();
+        ++expected;
+        const lines = await eventually('it to be given up', () => requests(server, '/image').length === expected && requests(server, '/image'));
+        assert.equal(lines.at(-1).status, 499, `${size} bytes, ${leave}`);
+        assert.equal(lines.at(-1).peer_left, true);
+      }
+    }
+  });
+}
+
+test('what is honestly asked behind a slow request is answered', async (t) => {
+  const server = await startServer(t);
+  const job = await finishedJob(server, small());
+  const get = (path) => `GET /v1/jobs/${job.id}${path} HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n`;
+  const { responses } = await sendRaw(server.port, get('/image?width_px=3000') + get('') + get('/cells'), { count: 3 });
+  assert.deepEqual(responses.map(({ status }) => status), [200, 200, 200]);
+  assert.equal(responses[0].headers['content-type'], 'image/png');
+  assert.equal(responses[1].json.id, job.id);
 });
 
 test('a client that only stops sending gets its picture', async (t) => {

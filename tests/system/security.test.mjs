@@ -11,7 +11,7 @@ import { finishedJob, small } from './harness/jobs.mjs';
 import { assertSane, cleanEnvironment, cliBinary, createToken, refusedStart, startServer, temporaryFolder } from './harness/server.mjs';
 import { openStream } from './harness/stream.mjs';
 import { makeCertificate, sendTls } from './harness/tls.mjs';
-import { within } from './harness/wait.mjs';
+import { eventually, within } from './harness/wait.mjs';
 
 const required = ['--auth.mode', 'required'];
 const bearer = (token) => ({ Authorization: `Bearer ${token}` });
@@ -103,6 +103,37 @@ test('tokens: scopes, revocation, actors, and a log without secrets', async (t) 
   assertNoSecrets(server, root, ann.token, bob.token, eve.token);
 });
 
+test('nothing is done for a token that ends while the body is under way', async (t) => {
+  const data = temporaryFolder(t);
+  const root = createToken(data, 'root', 'admin');
+  const server = await startServer(t, { data, token: root, args: required });
+  const kept = await made(server, 'kept', 'read');
+  const wish = JSON.stringify({ name: 'thief', scope: 'admin', expires_h: 80_000 });
+  for (const [method, path] of [['POST', '/v1/tokens'], ['DELETE', `/v1/tokens/${kept.id}`], ['POST', '/v1/jobs'], ['GET', '/v1/jobs']]) {
+    for (const how of ['revoked', 'expired']) {
+      const ends = await made(server, 'ends', 'admin', how === 'expired' ? 0.001 : 1);
+      const socket = net.connect(server.port, '127.0.0.1');
+      let answer = '';
+      socket.on('data', (bytes) => { answer += bytes; });
+      socket.write(`${method} ${path} HTTP/1.1\r\nHost: 127.0.0.1\r\nAuthorization: Bearer ${ends.token}\r\nContent-Type: application/json\r\n`
+        + `Content-Length: ${wish.length}\r\nExpect: 100-continue\r\n\r\n`);
+      await eventually('the header to be let in', () => answer.startsWith('HTTP/1.1 100 '));
+      socket.write(wish.slice(0, 5));
+      if (how === 'revoked') assert.equal((await server.request('DELETE', `/v1/tokens/${ends.id}`)).status, 204);
+      await eventually('the token to end', () => how === 'revoked' || Date.now() > Date.parse(ends.expires_at));
+      answer = '';
+      socket.write(wish.slice(5));
+      await eventually('the answer', () => answer.includes('\r\n\r\n'));
+      socket.destroy();
+      assert.match(answer, /^HTTP\/1\.1 401 /, `${method} ${path}, ${how}`);
+    }
+  }
+  const { items } = (await server.get('/v1/tokens')).json;
+  assert.ok(items.some(({ id }) => id === kept.id));
+  assert.ok(items.every(({ name }) => name !== 'thief'));
+  assert.equal((await server.get('/v1/jobs')).json.items.length, 0);
+});
+
 test('a server refuses to be reached without tokens and TLS', (t) => {
   const data = temporaryFolder(t);
   for (const [args, what] of [
@@ -117,7 +148,7 @@ test('a server refuses to be reached without tokens and TLS', (t) => {
     assert.match(stderr, what);
   }
   const missing = refusedStart(data, ['--listen', '127.0.0.1:0', '--tls.certificate', '/no/such', '--tls.key', '/no/such']);
-  assert.equal(missing.status, 1);
+  assert.equal(missing.status, 2);
   assert.match(missing.stderr, /tls\.certificate/);
 });
 
@@ -142,8 +173,9 @@ test('a certificate and a key that are of no use are named, and a key that other
     [{ certificate: key, key }, 'tls.certificate', key, 'not a certificate'],
   ]) {
     const { status, stderr } = refusedStart(data, ['--listen', '127.0.0.1:0', '--tls.certificate', wrong.certificate, '--tls.key', wrong.key]);
-    assert.equal(status, 1, stderr);
+    assert.equal(status, 2, stderr);
     for (const part of [`${setting}: `, `'${file}'`, why]) assert.ok(stderr.includes(part), `${part} in ${stderr}`);
+    assert.equal(stderr.split(`${setting}: cannot use`).length, 2, `said once: ${stderr}`);
   }
   for (const [mode, warns] of [[0o600, false], [0o640, false], [0o644, true], [0o660, true]]) {
     chmodSync(key, mode);
@@ -151,6 +183,13 @@ test('a certificate and a key that are of no use are named, and a key that other
     await server.stop();
     assert.equal(server.err.includes(`tls.key: others than its owner can get at '${key}' (mode 0${mode.toString(8)})`), warns, server.err);
   }
+});
+
+test('a port that is taken is no fault of the configuration', async (t) => {
+  const server = await startServer(t);
+  const { status, stderr } = refusedStart(temporaryFolder(t), ['--listen', `127.0.0.1:${server.port}`]);
+  assert.equal(status, 1, stderr);
+  assert.equal(stderr.split('cannot listen on').length, 2, stderr);
 });
 
 test('a token is made with the server stopped only', async (t) => {

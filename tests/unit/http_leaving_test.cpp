@@ -20,6 +20,12 @@ class Leaving : public ::testing::Test {
     server = std::make_unique<TestServer>(
         [this](Router& router) {
           router.add("GET", "/long", [this](const Request& request) { return compute(request); }, Router::Weight::kHeavy);
+          router.add("POST", "/deaf", [this](const Request& request) { compute(request); return text("done"); });
+          router.add("POST", "/later", [this](const Request&) {
+            Response response;
+            response.later = std::make_unique<Patient>(*this);
+            return response;
+          });
           router.add("GET", "/door", [this](const Request&) { door.pass(); return text("passed"); });
         },
         config);
@@ -41,8 +47,27 @@ class Leaving : public ::testing::Test {
     const std::lock_guard lock(mutex);
     ++given_up;
     changed.notify_all();
-    return text("given up");
+    Response response = text("given up");
+    response.gave_up = true;
+    return response;
   }
+
+  /// What was asked for is done; only its end is waited for.
+  struct Patient : LaterAnswer {
+    explicit Patient(Leaving& of) : test(of) {}
+    void on_ready(std::function<void()>) override {}
+    std::unique_ptr<Response> ask(bool is_last) override {
+      const std::lock_guard lock(test.mutex);
+      ++test.begun;
+      test.changed.notify_all();
+      if (!is_last) return nullptr;
+      auto response = std::make_unique<Response>();
+      response->status = 202;
+      return response;
+    }
+    std::chrono::milliseconds wait_max() const override { return std::chrono::hours(1); }
+    Leaving& test;
+  };
 
   /// Waits for it; a test fails instead of hanging.
   template <class Condition>
@@ -151,6 +176,41 @@ TEST_F(Leaving, WhatIsSentMeanwhileIsKept) {
   door.open();
   EXPECT_EQ(client.read_reply().body, "passed");
   for (int i = 0; i < 3; ++i) EXPECT_EQ(client.read_reply().body, "hello");
+}
+
+TEST_F(Leaving, WhoSendsTooMuchBehindWhatIsAtWorkIsNotWaitedFor) {
+  const std::string much(70'000, 'x');
+  RawClient at_work(server->port());
+  at_work.send(get("/long"));
+  until([this] { return begun == 1; });
+  RawClient waits(server->port());
+  waits.send(get("/long") + much);
+  until([this] { return count(kPeerHasLeft) == 1; });
+  EXPECT_EQ(begun, 1) << "taken out of the queue";
+  at_work.send(much);
+  until([this] { return count(kPeerHasLeft) == 2; });
+  EXPECT_EQ(given_up, 1);
+  for (const AccessRecord& record : records) EXPECT_TRUE(record.peer_left);
+  for (RawClient* const client : {&at_work, &waits}) EXPECT_EQ(client->read_to_end(), "") << "and the connection is closed";
+}
+
+TEST_F(Leaving, WhatWasDoneHasItsStatusInTheLogThoughNobodyTakesIt) {
+  const std::string body = " HTTP/1.1\r\n" + kHost + "Content-Length: 0\r\n\r\n";
+  for (const auto& [target, status] : {std::pair{"/deaf", 200}, std::pair{"/later", 202}}) {
+    const int before = begun;
+    const std::size_t lines = records.size();
+    RawClient client(server->port());
+    client.send("POST " + std::string(target) + body);
+    until([this, before] { return begun == before + 1; });
+    client.reset();
+    until([this, lines] { return records.size() == lines + 1; });
+    EXPECT_EQ(records.back().status, status) << target;
+    EXPECT_TRUE(records.back().peer_left);
+    EXPECT_EQ(records.back().body_bytes, 0u);
+  }
+  EXPECT_EQ(RawClient(server->port()).ask(get("/hello")).status, 200);
+  until([this] { return records.size() == 3; });
+  EXPECT_FALSE(records.back().peer_left);
 }
 
 TEST_F(Leaving, TheEndOfTheServerAsksToo) {

@@ -161,6 +161,61 @@ TEST(HttpSecurity, WhatWasFoundIsNotToldToATokenThatEndedMeanwhile) {
             "found") << "what is done is said to be done";
 }
 
+// The 100 says that the header was let in; what is sent then is a body behind which the token has ended.
+TEST(HttpSecurity, NothingIsBegunForATokenThatEndedBehindTheHeader) {
+  std::atomic<int> begun{0};
+  TestServer server(
+      [&begun](Router& router) {
+        for (const char* method : {"GET", "POST", "PATCH", "DELETE"}) {
+          router.add(method, "/act", [&begun](const Request&) { ++begun; return text("done"); }, Router::Weight::kLight, Access::kSubmit);
+        }
+      },
+      with_tokens());
+  server.run();
+  for (const std::string method : {"GET", "POST", "PATCH", "DELETE"}) {
+    for (const char* how : {"stays", "is removed", "expires"}) {
+      SCOPED_TRACE(method + ", and the token " + how);
+      const std::string token = add_token(server, "a", Scope::kSubmit);
+      RawClient client(server.port());
+      ASSERT_EQ(client.ask(method + " /act HTTP/1.1\r\n" + bearer(token) + "Content-Length: 5\r\nExpect: 100-continue\r\n\r\n").status, 100);
+      client.send("ab");
+      if (how == std::string("is removed")) server.tokens.remove("a");
+      if (how == std::string("expires")) server.tokens.add({"a", "name-a", Scope::kSubmit, hash_of_token(token), unix_time_ms() - 1});
+      client.send("cde");
+      const Reply reply = client.read_reply();
+      if (how == std::string("stays")) {
+        EXPECT_EQ(reply.status, 200);
+        EXPECT_EQ(begun.exchange(0), 1);
+      } else {
+        EXPECT_EQ(reply.status, 401);
+        EXPECT_THAT(reply.header("WWW-Authenticate"), HasSubstr("invalid_token"));
+        EXPECT_EQ(begun, 0);
+      }
+      server.tokens.remove("a");
+    }
+  }
+}
+
+TEST(HttpSecurity, NothingIsBegunForATokenThatEndedBeforeAWorkerCame) {
+  std::atomic<int> begun{0};
+  TokenTable* table = nullptr;
+  TestServer server(
+      [&begun, &table](Router& router) {
+        router.add("POST", "/act", [&begun](const Request&) { ++begun; return text("done"); }, Router::Weight::kLight, Access::kSubmit);
+        // Asked between the body and the queue of the workers.
+        router.set_ready("POST", "/act", [&table](const Request& request) -> std::optional<Response> {
+          table->remove(request.principal.token_id);
+          return std::nullopt;
+        });
+      },
+      with_tokens());
+  table = &server.tokens;
+  server.run();
+  const std::string token = add_token(server, "a", Scope::kSubmit);
+  EXPECT_EQ(RawClient(server.port()).ask("POST /act HTTP/1.1\r\n" + bearer(token) + "Content-Length: 0\r\n\r\n").status, 401);
+  EXPECT_EQ(begun, 0);
+}
+
 TEST(HttpSecurity, OneAddressHasItsShareOfConnectionsOnly) {
   ServerConfig config;
   config.connections_per_address_max = 2;
@@ -290,7 +345,9 @@ TEST(HttpSecurity, NothingButLoopbackWithoutTokensAndTls) {
   config.tls_key = "/no/such/file";
   const auto server = Server::create(config, router, tokens, {});
   ASSERT_FALSE(server);
+  EXPECT_EQ(server.error().code, ErrorCode::kInvalid);
   EXPECT_EQ(server.error().fields.at(0).pointer, "tls.certificate");
+  EXPECT_THAT(server.error().message, ::testing::Not(HasSubstr("tls.certificate"))) << "said once, by the field";
 }
 
 }  // namespace

@@ -182,6 +182,9 @@ TEST(HttpShapes, UnusualButRightShapesAreAnswered) {
       {"two slashes", get("//hello"), 404},
       {"wrong method", "PUT /hello HTTP/1.1\r\n" + kHost + "\r\n", 405},
       {"options of the server", "OPTIONS * HTTP/1.1\r\n" + kHost + "\r\n", 204},
+      {"options of the server, absolute", "OPTIONS http://localhost HTTP/1.1\r\n" + kHost + "\r\n", 204},
+      {"options of what is nowhere, absolute", "OPTIONS http://localhost/ HTTP/1.1\r\n" + kHost + "\r\n", 404},
+      {"options of what is nowhere, with a query", "OPTIONS http://localhost?a HTTP/1.1\r\n" + kHost + "\r\n", 404},
       {"options", "OPTIONS /hello HTTP/1.1\r\n" + kHost + "\r\n", 204},
   };
   for (const auto& shape : shapes) {

@@ -181,6 +181,7 @@ TEST(HttpServer, BindsLoopbackOnlyAndSaysWhyNot) {
   config.port = other.port();
   const auto server = Server::create(config, router, tokens, {});
   ASSERT_FALSE(server);
+  EXPECT_EQ(server.error().code, ErrorCode::kUnavailable) << "nothing is wrong with the configuration";
   EXPECT_NE(server.error().message.find(std::to_string(other.port())), std::string::npos);
   config.port = 0;
   config.worker_threads = 0;

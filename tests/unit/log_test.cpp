@@ -42,6 +42,16 @@ TEST(Log, TextIsOneLineToo) {
   EXPECT_EQ(log_event(LogFormat::kText, "", "info", "a\nb").text, "a\\x0ab");
 }
 
+TEST(Log, AnAnswerThatNobodyTookIsMarked) {
+  http::AccessRecord access = record();
+  for (const bool left : {false, true}) {
+    access.peer_left = left;
+    const auto marked = [left](const char* mark) { return left ? ::testing::Matcher<std::string>(HasSubstr(mark)) : Not(HasSubstr("left")); };
+    EXPECT_THAT(log_access(LogFormat::kJson, "", access).text, marked(",\"peer_left\":true}"));
+    EXPECT_THAT(log_access(LogFormat::kText, "", access).text, marked(" 404 peer left 12 us "));
+  }
+}
+
 TEST(Log, ATokenInAnUnlikelyPlaceIsHidden) {
   const std::string token = *http::new_token();
   http::AccessRecord access = record();

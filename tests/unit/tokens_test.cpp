@@ -17,6 +17,7 @@ using ::testing::Not;
 
 TEST(Tokens, ASecretIsShownOnceAndWorksUntilItIsRevoked) {
   ApiFixture api;
+  api.tokens.add({"t", "ann", http::Scope::kAdmin, {}, http::unix_time_ms() + 3'600'000});
   api.principal = {"ann", http::Scope::kAdmin, "t"};
   http::Response made = api.post("/v1/tokens", R"({"name": "bob", "scope": "submit", "expires_h": 1.5})");
   ASSERT_EQ(made.status, 201) << made.body;
@@ -107,9 +108,29 @@ TEST(Tokens, TheLastValidAdminStays) {
   }
   const std::string second = make("admin");
   EXPECT_EQ(api.ask("DELETE", "/v1/tokens/" + first).status, 204);
+  api.principal.token_id = second;
   EXPECT_EQ(api.ask("DELETE", "/v1/tokens/" + second).status, 409);
   api.principal = {};  // a server without tokens locks nobody out
   EXPECT_EQ(api.ask("DELETE", "/v1/tokens/" + second).status, 204);
+}
+
+// Its request was let in before: it may have waited for the turn that the removal had.
+TEST(Tokens, ATokenThatHasEndedMakesAndRemovesNone) {
+  ApiFixture api;
+  const std::string wish = R"({"name": "x", "expires_h": 1, "scope": "admin"})";
+  http::Response kept = api.post("/v1/tokens", wish);
+  const std::string other = json_of(kept)["id"];
+  for (const bool expires : {false, true}) {
+    if (expires) api.tokens.add({"t", "ann", http::Scope::kAdmin, {}, http::unix_time_ms() - 1});
+    api.principal = {"ann", http::Scope::kAdmin, "t"};
+    http::Response made = api.post("/v1/tokens", wish);
+    EXPECT_EQ(made.status, 401);
+    EXPECT_THAT(made.body, HasSubstr("request-1"));
+    EXPECT_THAT(header(made, "WWW-Authenticate"), HasSubstr("invalid_token"));
+    EXPECT_EQ(api.ask("DELETE", "/v1/tokens/" + other).status, 401);
+    http::Response list = api.get("/v1/tokens");
+    EXPECT_EQ(json_of(list)["items"].size(), 1u) << "none more, and the other one stays";
+  }
 }
 
 TEST(Tokens, WhatGivesWayIsLoggedAndUnknown) {

@@ -16,7 +16,7 @@ export const mayInclude = {
   'server/jobs/': ['engine/base/', 'engine/model/', 'engine/sim/', 'engine/analysis/', 'server/store/'],
   'server/http/': ['engine/base/'],
   'server/api/': ['engine/base/', 'engine/model/', 'engine/sim/', 'engine/picture/', 'engine/analysis/', 'server/jobs/',
-    'server/store/', 'server/http/message.hpp', 'server/http/router.hpp', 'server/http/tokens.hpp'],
+    'server/store/', 'server/http/admission.hpp', 'server/http/message.hpp', 'server/http/router.hpp', 'server/http/tokens.hpp'],
   'server/main.cpp': ['engine/', 'server/'],
   'server/config.*': ['engine/', 'server/'],
   'server/config_keys.*': ['engine/', 'server/'],
