@@ -105,7 +105,7 @@ test('tokens: scopes, revocation, actors, and a log without secrets', async (t) 
 
 test('nothing is done for a token that ends while the body is under way', async (t) => {
   const data = temporaryFolder(t);
-  const root = createToken(data, 'root', 'admin');
+  const root = createToken(data, 'root', 'admin', 2);  // lasts long enough for others of its scope to be revoked
   const server = await startServer(t, { data, token: root, args: required });
   const kept = await made(server, 'kept', 'read');
   const wish = JSON.stringify({ name: 'thief', scope: 'admin', expires_h: 80_000 });
