@@ -44,13 +44,13 @@ test('an edit and a deletion at once with one If-Match: one is done, and the oth
   for (let round = 0; round < rounds; ++round) {
     const { id } = await finishedJob(server, small(round, 1));
     const { etag } = (await server.get(`/v1/jobs/${id}`)).headers;
-    const [edit, removal] = await Promise.all([
-      server.request('PATCH', `/v1/jobs/${id}`, {
-        headers: { 'Content-Type': 'application/merge-patch+json', 'If-Match': etag },
-        body: '{"labels":{"keep":"true"}}',
-      }),
-      server.request('DELETE', `/v1/jobs/${id}`, { headers: { 'If-Match': etag } }),
-    ]);
+    const edits = () => server.request('PATCH', `/v1/jobs/${id}`, {
+      headers: { 'Content-Type': 'application/merge-patch+json', 'If-Match': etag },
+      body: '{"labels":{"keep":"true"}}',
+    });
+    const removes = () => server.request('DELETE', `/v1/jobs/${id}`, { headers: { 'If-Match': etag } });
+    const sent = round % 2 ? [edits(), removes()] : [removes(), edits()].reverse(); // begun in either order
+    const [edit, removal] = await Promise.all(sent);
     const outcome = `${edit.status} ${removal.status}`;
     assert.ok(['200 412', '404 204'].includes(outcome), `round ${round}: ${outcome}`);
     assert.equal((await server.get(`/v1/jobs/${id}`)).status, edit.status, 'what was kept is there');
