@@ -200,7 +200,7 @@ TEST_F(Cli, SuffixesAreResolvedThroughAllPages) {
   EXPECT_THAT(out(), HasSubstr("progress.cells: 180\n"));
   EXPECT_EQ(server.requests().back().line(), "GET /v1/jobs/" + kId + " HTTP/1.1");
   EXPECT_EQ(run({"show", "FFFF"}), 2);
-  EXPECT_THAT(err(), HasSubstr("'ffff' is the end of 2 job ids"));
+  EXPECT_THAT(err(), HasSubstr("'FFFF' is the end of 2 job ids"));
   EXPECT_EQ(run({"show", "eeee"}), 4);
   EXPECT_THAT(err(), HasSubstr("no job's id ends in 'eeee'"));
   EXPECT_EQ(run({"show", "234"}), 2);
