@@ -99,17 +99,23 @@ void draw_dashed(Canvas& canvas, const std::vector<CanvasPoint>& points, Ink ink
   }
 }
 
+/// What lies under the curves of either panel. `y`: where a value of `values` stands; `as`: how it is written.
+template <class Y>
+void draw_grid(Canvas& canvas, const Panel& panel, const Axes& axes, const std::vector<Curve>& curves, const std::vector<double>& values,
+               const char* as, Y y) {
+  const auto with_fit = std::find_if(curves.begin(), curves.end(), [](const Curve& c) { return !c.is_control && c.compared->dimensions; });
+  draw_sides(canvas, panel, axes, with_fit == curves.end() ? nullptr : &*with_fit);
+  for (const double value : values) {
+    canvas.line({panel.x, y(value)}, {panel.x + panel.width, y(value)}, kGridInk);
+    canvas.text({panel.x - 10.0, y(value) + 6.0}, format(as, value), kAxisInk, Align::kRight);
+  }
+  canvas.text({panel.x + panel.width, panel.y + panel.height + 50.0}, "box side s, px", kAxisInk, Align::kRight);
+}
+
 }  // namespace
 
 void draw_counts(Canvas& canvas, const Panel& panel, const Axes& axes, const std::vector<Curve>& curves) {
-  const auto with_fit = std::find_if(curves.begin(), curves.end(), [](const Curve& c) { return !c.is_control && c.compared->dimensions; });
-  draw_sides(canvas, panel, axes, with_fit == curves.end() ? nullptr : &*with_fit);
-  for (const double count : ticks(axes.y_low, axes.y_high)) {
-    const double y = axes.y(panel, count);
-    canvas.line({panel.x, y}, {panel.x + panel.width, y}, kGridInk);
-    canvas.text({panel.x - 10.0, y + 6.0}, format("%.0f", count), kAxisInk, Align::kRight);
-  }
-  canvas.text({panel.x + panel.width, panel.y + panel.height + 50.0}, "box side s, px", kAxisInk, Align::kRight);
+  draw_grid(canvas, panel, axes, curves, ticks(axes.y_low, axes.y_high), "%.0f", [&](double count) { return axes.y(panel, count); });
   // Controls first: the lines in question lie over them.
   for (const bool is_control : {true, false}) {
     for (const Curve& curve : curves) {
@@ -178,14 +184,7 @@ void draw_legend(Canvas& canvas, const Panel& panel, const std::vector<Curve>& c
 }
 
 void draw_slopes(Canvas& canvas, const Panel& panel, const Axes& axes, const SlopeRange& range, const std::vector<Curve>& curves) {
-  const auto with_fit = std::find_if(curves.begin(), curves.end(), [](const Curve& c) { return !c.is_control && c.compared->dimensions; });
-  draw_sides(canvas, panel, axes, with_fit == curves.end() ? nullptr : &*with_fit);
-  for (const double slope : slope_ticks(range.low, range.high)) {
-    const double y = range.y(panel, slope);
-    canvas.line({panel.x, y}, {panel.x + panel.width, y}, kGridInk);
-    canvas.text({panel.x - 10.0, y + 6.0}, format("%.1f", slope), kAxisInk, Align::kRight);
-  }
-  canvas.text({panel.x + panel.width, panel.y + panel.height + 50.0}, "box side s, px", kAxisInk, Align::kRight);
+  draw_grid(canvas, panel, axes, curves, slope_ticks(range.low, range.high), "%.1f", [&](double slope) { return range.y(panel, slope); });
   for (const bool is_control : {true, false}) {
     for (const Curve& curve : curves) {
       if (curve.is_control != is_control) continue;

@@ -22,6 +22,11 @@ void add_door(Router& router, Door& door, Router::Weight weight) {
       weight);
 }
 
+void add_heavy_and_light(Router& router, Door& door) {
+  add_door(router, door, Router::Weight::kHeavy);
+  router.add("GET", "/light", [](const Request&) { return text("light"); });
+}
+
 /// One request at the door, and two more where there is room for one to wait: the other is refused. Which one, the kernel decides.
 class CrowdedDoor {
  public:
@@ -53,12 +58,7 @@ TEST(HttpLimits, HeavyRequestsHaveAQueueOfTheirOwn) {
   config.worker_threads = 2;
   config.requests_waiting_max = 8;  // one heavy request may wait
   Door door;
-  TestServer server(
-      [&door](Router& router) {
-        add_door(router, door, Router::Weight::kHeavy);
-        router.add("GET", "/light", [](const Request&) { return text("light"); });
-      },
-      config);
+  TestServer server([&door](Router& router) { add_heavy_and_light(router, door); }, config);
   server.run();
   CrowdedDoor crowd(server.port(), door);
   EXPECT_EQ(crowd.refusal().status, 503);
@@ -119,12 +119,7 @@ TEST(HttpLimits, HeavyRequestsLeaveThreadsForTheOthers) {
   ServerConfig config;
   config.worker_threads = 2;
   Door door;
-  TestServer server(
-      [&door](Router& router) {
-        add_door(router, door, Router::Weight::kHeavy);
-        router.add("GET", "/light", [](const Request&) { return text("light"); });
-      },
-      config);
+  TestServer server([&door](Router& router) { add_heavy_and_light(router, door); }, config);
   server.run();
   std::vector<std::unique_ptr<RawClient>> heavy;
   for (int i = 0; i < 4; ++i) {
