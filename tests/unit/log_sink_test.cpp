@@ -10,6 +10,7 @@
 #include <memory>
 #include <sstream>
 #include <string>
+#include <sys/resource.h>
 #include <unistd.h>
 #include <vector>
 
@@ -153,6 +154,36 @@ TEST(LogSink, EveryLineIsWrittenOrCounted) {
   EXPECT_EQ(lines + lost_count, logged_count + told_count);
   EXPECT_THAT(text, ::testing::HasSubstr("lost " + std::to_string(lost_count) + "\n"));
   close(full);
+  close(file);
+  std::remove(path.c_str());
+}
+
+// A file that may not grow beyond some bytes stands for a disk that is full for a while: no line runs into the one that was cut.
+TEST(LogSink, ALineThatWasCutTearsNoOther) {
+  std::signal(SIGXFSZ, SIG_IGN);
+  const std::string path = ::testing::TempDir() + "log_sink_cut_test.txt";
+  const int file = open(path.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_APPEND | O_CLOEXEC, 0600);
+  ASSERT_GE(file, 0);
+  std::size_t told_count = 0;
+  const auto sink = std::make_shared<LogSink>(file, 10'000'000, [&](std::size_t) {  // room for all: only a write loses
+    ++told_count;
+    return std::string("lost");
+  });
+  spdlog::logger logger("test", sink);
+  logger.set_pattern("%v");
+  rlimit before{};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
+  const rlimit small{10, before.rlim_max};
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
+  while (told_count == 0) logger.info("twelve bytes");
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &before), 0);
+  while (told_count == 1) logger.info("whole");
+  ASSERT_TRUE(sink->end(kLong));
+  std::ifstream in(path);
+  std::string line;
+  ASSERT_TRUE(std::getline(in, line));
+  EXPECT_EQ(line, "twelve byt");
+  while (std::getline(in, line)) EXPECT_THAT(line, ::testing::AnyOf("twelve bytes", "lost", "whole"));
   close(file);
   std::remove(path.c_str());
 }
